@@ -1,0 +1,50 @@
+# Everything runs in .venv, which is made when it is missing and renewed when its two sources change.
+# Another Python: make PYTHON=/path/to/python3.12
+
+PYTHON ?= python3
+JOBS ?= auto
+BIN := .venv/bin
+STAMP := .venv/.installed
+
+.PHONY: help demo test check bench format clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make demo     learn from recordings, then walk: writes demo/"
+	@echo "make test     tests and examples"
+	@echo "make check    format, lint, types, layers"
+	@echo "make bench    how fast it is"
+	@echo "make format   put the sources in order"
+	@echo "make clean    remove everything that make has made"
+
+$(STAMP): pyproject.toml constraints.txt
+	@command -v $(PYTHON) >/dev/null || { echo "no $(PYTHON) here; name a Python 3.11 or newer: make PYTHON=/path/to/python" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.version_info >= (3, 11) or sys.exit("stridecast needs Python 3.11 or newer, and $(PYTHON) is %d.%d; name another: make PYTHON=/path/to/python" % sys.version_info[:2])'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@
+
+demo: $(STAMP)
+	$(BIN)/python examples/demo.py
+
+test: $(STAMP)
+	$(BIN)/python -m pytest -n $(JOBS)
+
+check: $(STAMP)
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(STAMP)
+	@if ls bench/*.py >/dev/null 2>&1; \
+	then $(BIN)/python -m pytest bench --benchmark-only -o python_files='bench_*.py test_*.py'; \
+	else echo "no benchmarks in bench/"; fi
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf .venv build dist demo .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .benchmarks
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

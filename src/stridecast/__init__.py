@@ -1,0 +1,1 @@
+"""stridecast: on-line human locomotion from motion capture."""

@@ -1,0 +1,259 @@
+"""Gait events: support phases, mid-stances, and the boundaries at which a stream is cut into half cycles (KS05)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from stridecast.geometry import signals
+from stridecast.model.contacts import LEFT, RIGHT, Contacts
+from stridecast.model.segment import RUN, STAND, WALK, Boundary, MidStance, Phase, Segment
+
+SHORTEST_STATE = 0.06
+"""A state shorter than this between two equal states is a blip, seconds."""
+
+RUNNING_SPEED = 2.1
+"""Where a step from foot to foot shows neither double support nor flight, the walker's speed decides which it was, m/s."""
+
+LONGEST_BRUSH = 0.1
+"""Both feet on the floor for less than this while running is a step with no air under it, as in sharp turns, seconds."""
+
+LONGEST = 1.7
+"""A moving segment longer than this is no half cycle, seconds."""
+
+LONGEST_DOUBLE = 0.55
+"""Walking with both feet on the floor for longer than this is a pause, seconds."""
+
+HARD = 1.4
+"""A half cycle of walking whose speed changes faster than this belongs to a transition, m/s2."""
+
+MAX_WALKED_THROUGH = 3
+"""So many walking half cycles between running and standing still are part of one transition."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gait:
+    """What the feet did in a take."""
+
+    phases: tuple[Phase, ...]
+    mid_stances: tuple[MidStance, ...]
+    boundaries: tuple[Boundary, ...]
+    segments: tuple[Segment, ...]
+
+
+def find_gait(
+    contacts: Contacts, heights: Float[np.ndarray, "frames"], speeds: Float[np.ndarray, "frames"], rate: float
+) -> Gait:
+    """Phases, mid-stances, boundaries and segments of a take.
+
+    Parameters
+    ----------
+    contacts
+        Which foot stands when.
+    heights, speeds
+        Height (m) and ground speed (m/s) of the centre of mass, smoothed.
+    rate
+        Frames a second.
+    """
+    phases = support_phases(contacts.support(), speeds, rate)
+    boundaries = find_boundaries(phases, heights, len(heights))
+    return Gait(
+        phases=tuple(phases),
+        mid_stances=tuple(find_mid_stances(phases, len(heights))),
+        boundaries=tuple(boundaries),
+        segments=tuple(cut_segments(phases, boundaries, rate)),
+    )
+
+
+def support_phases(support: str, speeds: Float[np.ndarray, "frames"], rate: float) -> list[Phase]:
+    """Support states as phases that a gait can have.
+
+    Blips between equal states go; double support next to standing is standing; a step from foot to foot with nothing in
+    between gets one frame of double support or flight.
+    """
+    letters = np.array(list(support))
+    # Double support and flight back to back: the shorter is noise. Then blips, shortest first.
+    while True:
+        phases = [Phase(str(v), a, b) for v, a, b in signals.runs(letters)]
+        bad = [(p.stop - p.start, i) for i, p in enumerate(phases) if _is_noise(phases, i, rate)]
+        if not bad:
+            break
+        i = min(bad)[1]
+        letters[phases[i].start : phases[i].stop] = _replacement(phases, i)
+    for before, after in zip(phases[:-1], phases[1:], strict=True):
+        running = speeds[after.start] > RUNNING_SPEED
+        if {before.state, after.state} == {"L", "R"}:
+            letters[after.start] = "F" if running else "D"
+        elif after.state == "D" and running and after.stop - after.start < LONGEST_BRUSH * rate:
+            letters[after.start : after.stop] = "F"
+    return [Phase(str(v), a, b) for v, a, b in signals.runs(letters)]
+
+
+def _is_noise(phases: list[Phase], i: int, rate: float) -> bool:
+    here = phases[i]
+    if i == 0 or i == len(phases) - 1:
+        return False
+    before, after = phases[i - 1], phases[i + 1]
+    if here.state == "S":
+        return False
+    if before.state == after.state:
+        return here.stop - here.start < SHORTEST_STATE * rate
+    if here.state in "DF" and after.state in "DF":
+        return True
+    return here.state in "DF" and before.state in "DF"
+
+
+def _replacement(phases: list[Phase], i: int) -> str:
+    before, after = phases[i - 1].state, phases[i + 1].state
+    return before if before == after or before in "DF" else after
+
+
+def find_mid_stances(phases: list[Phase], frames: int) -> list[MidStance]:
+    """Middle frame of the support phase of each foot (heel strike to toe-off, double supports included).
+
+    A support phase that the take cuts short counts when at least two thirds of it are there, judged by the median of
+    the whole ones; its middle is taken from the end that can be seen.
+    """
+    found: list[MidStance] = []
+    for side, letter in ((LEFT, "L"), (RIGHT, "R")):
+        carried = [(p.start, p.stop) for p in _merged(phases, letter)]
+        whole = [b - a for a, b in carried if a > 0 and b < frames]
+        usual = float(np.median(whole)) if whole else np.inf
+        for a, b in carried:
+            if a > 0 and b < frames:
+                found.append(MidStance((a + b - 1) / 2, side))
+            elif b - a >= usual * 2 / 3 and (a > 0 or b < frames):
+                found.append(MidStance(a + (usual - 1) / 2 if a > 0 else b - (usual + 1) / 2, side))
+    return sorted(m for m in found if 0 <= m.frame <= frames - 1)
+
+
+def _merged(phases: list[Phase], letter: str) -> list[Phase]:
+    """Stretches in which one foot carries, its double supports included; standing ends a stretch."""
+    out: list[Phase] = []
+    for p in phases:
+        if p.state not in (letter, "D"):
+            continue
+        if out and out[-1].stop == p.start:
+            out[-1] = Phase(letter, out[-1].start, p.stop)
+        else:
+            out.append(Phase(letter, p.start, p.stop))
+    single = [p for p in phases if p.state == letter]
+    return [p for p in out if any(p.start <= s.start < p.stop for s in single)]
+
+
+def find_boundaries(phases: list[Phase], heights: Float[np.ndarray, "frames"], frames: int) -> list[Boundary]:
+    """One boundary for each single support of walking and each flight of running, and the ends of each standing.
+
+    The place is the peak of the centre of mass's height inside the phase; the gait events guard it, so that a peak which
+    is none, or one that is missing, makes no false segment. A phase cut by the take counts if its peak can be seen.
+    """
+    found: list[Boundary] = []
+    for i, p in enumerate(phases):
+        if p.state == "S":
+            found += [Boundary(p.start, "S"), Boundary(p.stop - 1, "S")]
+            continue
+        before = phases[i - 1].state if i else ""
+        after = phases[i + 1].state if i + 1 < len(phases) else ""
+        if p.state == "F":
+            landing = after if after in ("L", "R") else {"L": "R", "R": "L"}.get(before, "")
+            kind = f"F{landing}" if landing else ""
+        elif p.state in "LR" and (before or after):
+            kind = "" if (before or "F") == "F" and (after or "F") == "F" else p.state
+        else:
+            kind = ""
+        if kind:
+            peak, inside = _peak(heights, p)
+            if inside or (p.start > 0 and p.stop < frames):
+                found.append(Boundary(peak, kind))
+    return found
+
+
+def _peak(heights: Float[np.ndarray, "frames"], phase: Phase) -> tuple[int, bool]:
+    """Frame of the highest point inside a phase, or its middle where the height only rises or falls."""
+    at = phase.start + int(np.argmax(heights[phase.start : phase.stop]))
+    margin = max(1, (phase.stop - phase.start) // 8)
+    if phase.start + margin <= at < phase.stop - margin:
+        return at, True
+    return (phase.start + phase.stop - 1) // 2, False
+
+
+def cut_segments(phases: list[Phase], boundaries: list[Boundary], rate: float) -> list[Segment]:
+    """Segments between neighbouring boundaries; longer ones than a half cycle can be are dropped."""
+    out = []
+    for start, stop in zip(boundaries[:-1], boundaries[1:], strict=True):
+        inside = [p for p in phases if p.start <= stop.frame and p.stop > start.frame]
+        if stop.frame <= start.frame or _is_pause(start, stop, inside, rate):
+            continue
+        # Both feet stand: next to standing, double support is the same state.
+        merged: list[Phase] = []
+        for i, p in enumerate(inside):
+            neighbours = {q.state for q in inside[max(i - 1, 0) : i + 2]}
+            state = "S" if p.state == "D" and "S" in neighbours else p.state
+            if merged and merged[-1].state == state:
+                merged[-1] = Phase(state, merged[-1].start, p.stop)
+            else:
+                merged.append(Phase(state, p.start, p.stop))
+        out.append(
+            Segment(
+                start=start,
+                stop=stop,
+                string="".join(p.state for p in merged),
+                keys=tuple(p.start for p in merged[1:]),
+                motion=_kind_of(start.kind, stop.kind),
+            )
+        )
+    return out
+
+
+def _is_pause(start: Boundary, stop: Boundary, inside: list[Phase], rate: float) -> bool:
+    """Whether a stretch is neither standing nor a half cycle."""
+    if start.kind == stop.kind == "S" and len(inside) == 1:
+        return False
+    long_double = any(p.state == "D" and p.stop - p.start > LONGEST_DOUBLE * rate for p in inside)
+    between_steps = "S" not in (start.kind, stop.kind)
+    return stop.frame - start.frame > LONGEST * rate or (between_steps and long_double)
+
+
+def _kind_of(start: str, stop: str) -> str:
+    ends = [STAND if kind == "S" else RUN if kind.startswith("F") else WALK for kind in (start, stop)]
+    return ends[0] if ends[0] == ends[1] else f"{ends[0]}-{ends[1]}"
+
+
+def label_motions(segments: Sequence[Segment], accelerations: Sequence[float]) -> list[Segment]:
+    """Coarse motion of each segment, seen in its context.
+
+    A few walking half cycles on the way from standing to running, or from running to standing, are part of that
+    transition, and so are those next to running in which the walker speeds up or brakes harder than walking does.
+
+    Parameters
+    ----------
+    segments
+        Of one take, in order.
+    accelerations
+        Mean tangential acceleration of the vehicle in each, m/s2.
+    """
+    labels = [s.motion for s in segments]
+    follows = [False] + [a.stop == b.start for a, b in zip(segments[:-1], segments[1:], strict=True)]
+    for first, last, whole in (
+        (f"{STAND}-{WALK}", f"{WALK}-{RUN}", f"{STAND}-{RUN}"),
+        (f"{RUN}-{WALK}", f"{WALK}-{STAND}", f"{RUN}-{STAND}"),
+    ):
+        for i, label in enumerate(labels):
+            if label != first:
+                continue
+            j = i + 1
+            while j < len(segments) and labels[j] == WALK and follows[j]:
+                j += 1
+            if j < len(segments) and labels[j] == last and follows[j] and j - i - 1 <= MAX_WALKED_THROUGH:
+                labels[i : j + 1] = [whole] * (j + 1 - i)
+    hard = [label == WALK and abs(a) > HARD for label, a in zip(labels, accelerations, strict=True)]
+    for i in reversed(range(len(labels) - 1)):
+        if hard[i] and follows[i + 1] and labels[i + 1].endswith(f"-{RUN}"):
+            labels[i] = labels[i + 1]
+    for i in range(1, len(labels)):
+        if hard[i] and follows[i] and labels[i - 1].startswith(f"{RUN}-"):
+            labels[i] = labels[i - 1]
+    return [s if s.motion == label else replace(s, motion=label) for s, label in zip(segments, labels, strict=True)]

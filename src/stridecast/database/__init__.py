@@ -1,0 +1,1 @@
+"""From many analyses to groups, a transition graph and one frozen database."""

@@ -1,0 +1,1 @@
+"""Doors to files, one file a format."""

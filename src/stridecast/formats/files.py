@@ -1,0 +1,92 @@
+"""Text files: read whole with plain words for what is wrong with them, written so that a crash leaves the old one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from secrets import token_hex
+from typing import BinaryIO
+
+from stridecast.errors import FileError
+
+_SIGNS = (
+    (b"hierarchy", "a BVH recording"),
+    (b"#!oml:asf", "an AMC recording"),
+    (b":fully-specified", "an AMC recording"),
+    (b":degrees", "an AMC recording"),
+    (b":bonedata", "an ASF skeleton"),
+    (b":version", "an ASF skeleton"),
+    (b"version https://git-lfs", "a Git LFS pointer: the recording itself was never fetched"),
+    (b"<!doctype", "a web page"),
+    (b"<html", "a web page"),
+    (b"; fbx", "an FBX file"),
+)
+_BINARY_SIGNS = (
+    (b"Kaydara FBX", "an FBX file"),
+    (b"glTF", "a GLB file"),
+    (b"PK\x03\x04", "a ZIP archive (or an .npz file)"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"\x93NUMPY", "a NumPy array"),
+    (b"PXR-USDC", "a USD file"),
+    (b"\xff\xfe", "text in UTF-16; it must be saved as UTF-8"),
+    (b"\xfe\xff", "text in UTF-16; it must be saved as UTF-8"),
+)
+
+
+def looks_like(data: bytes) -> str:
+    """Name what a file holds from its first bytes: "a BVH recording", "an FBX file", ..., or "" where no sign is known."""
+    for sign, name in _BINARY_SIGNS:
+        if data.startswith(sign):
+            return name
+    if len(data) > 1 and data[1] == 0x50 and b"\0" in data[:512]:
+        return "a C3D file"
+    if b"\0" in data:
+        return "binary data"
+    head = data[:4096].lower()
+    found = [(head.find(sign), name) for sign, name in _SIGNS if sign in head]
+    return min(found)[1] if found else ""
+
+
+def read_text(path: str | Path) -> bytes:
+    r"""Whole content of a text file, without byte order mark, every line end as ``\n``.
+
+    Raises
+    ------
+    FileError
+        No such file, not readable, empty, or binary (with what it looks like).
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror or error}", path=path) from error
+    if b"\0" in data:
+        raise FileError(f"should be text, but looks like {looks_like(data)}", path=path)
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if not data.strip():
+        raise FileError("is empty", path=path)
+    if b"\r" in data:
+        data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    return data
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[BinaryIO]:
+    """Open a new file beside ``path`` for writing; it takes that name only once it is whole.
+
+    Raises
+    ------
+    FileError
+        The file system refuses (no such folder, no right, disk full). What was at ``path`` is untouched.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{token_hex(4)}.part")
+    try:
+        try:
+            with temporary.open("xb") as file:
+                yield file
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror or error}", path=path) from error

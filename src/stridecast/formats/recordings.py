@@ -1,0 +1,135 @@
+"""One door for all recordings: a file of any format that is read here becomes a ``Motion``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from stridecast.body.conventions import to_motion, to_skeleton
+from stridecast.body.rig import RawRecording
+from stridecast.errors import FileError, SkeletonError
+from stridecast.formats.amc import read_amc
+from stridecast.formats.asf import read_asf
+from stridecast.formats.bvh import read_bvh
+from stridecast.model.motion import Motion
+from stridecast.model.skeleton import Skeleton
+
+RECORDINGS = {".bvh": "BVH", ".amc": "AMC with its ASF"}
+"""Suffixes of the recordings that ``load_motion`` reads, and what they are."""
+
+SKELETONS = {".bvh": "BVH", ".asf": "ASF"}
+"""Suffixes of the files that ``load_skeleton`` reads, and what they are."""
+
+
+def load_motion(
+    path: str | Path,
+    *,
+    roles: Mapping[str, str] | None = None,
+    scale: float | None = None,
+    frame_rate: float | None = None,
+    up: str | None = None,
+    skeleton_path: str | Path | None = None,
+    subject: str | None = None,
+) -> Motion:
+    """Load a recording.
+
+    Parameters
+    ----------
+    path
+        A BVH or AMC file, known by its suffix.
+    roles
+        Joints of the body whose names are unusual, role to joint name; the others are found by their names.
+    scale
+        Metres per unit of the file. Left out: what the file says, else a usual unit that makes the legs an adult's.
+    frame_rate
+        Frames a second. Left out: what the file says, else 120.
+    up
+        Axis that points up, ``"Y"`` or ``"Z"``. Left out: where the head is.
+    skeleton_path
+        The ASF of an AMC. Left out: ``07.asf`` beside ``07_01.amc``, else the only ASF in the folder.
+    subject
+        Who moves. Left out: ``07`` for ``07_01.bvh``, else the name of the folder.
+
+    Returns
+    -------
+    Motion
+        In metres, +Y up, its rest pose facing +Z, at the recording's frame rate and with its floor where the recording
+        has it.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, is damaged, or is of no format that is read; with the line.
+    SkeletonError
+        The joints of the legs are not found or have no length, or ``roles`` names something that does not exist.
+    MotionError
+        Fewer than two frames, or a root or legs that move as no person's do.
+    InputError
+        A scale that is not positive, or an unknown axis.
+    """
+    return load_recording(
+        path, roles=roles, scale=scale, frame_rate=frame_rate, up=up, skeleton_path=skeleton_path, subject=subject
+    )[0]
+
+
+def load_recording(
+    path: str | Path,
+    *,
+    roles: Mapping[str, str] | None = None,
+    scale: float | None = None,
+    frame_rate: float | None = None,
+    up: str | None = None,
+    skeleton_path: str | Path | None = None,
+    subject: str | None = None,
+) -> tuple[Motion, tuple[str, ...]]:
+    """Load a recording as ``load_motion`` does; also tell, in a sentence each, what was guessed, turned, dropped or added."""
+    path = Path(path)
+    recording = _read(path, skeleton_path)
+    try:
+        return to_motion(
+            recording,
+            roles=roles,
+            scale=scale,
+            frame_rate=frame_rate,
+            up=up,
+            name=path.stem,
+            subject=_subject(path) if subject is None else subject,
+            source=str(path),
+        )
+    except SkeletonError as error:
+        raise SkeletonError(f"{path}: {error}") from None
+
+
+def load_skeleton(
+    path: str | Path, *, roles: Mapping[str, str] | None = None, scale: float | None = None
+) -> Skeleton:
+    """Load only the skeleton of a BVH or ASF file; parameters and errors as of ``load_motion``."""
+    path = Path(path)
+    suffix = path.suffix.lower()
+    if suffix not in SKELETONS:
+        raise FileError(f"is no skeleton that can be read; readable are {_listed(SKELETONS)}", path=path)
+    recording = read_bvh(path) if suffix == ".bvh" else read_asf(path).at_rest()
+    try:
+        return to_skeleton(recording, roles=roles, scale=scale)[0]
+    except SkeletonError as error:
+        raise SkeletonError(f"{path}: {error}") from None
+
+
+def _read(path: Path, skeleton_path: str | Path | None) -> RawRecording:
+    suffix = path.suffix.lower()
+    if suffix == ".bvh":
+        return read_bvh(path)
+    if suffix == ".amc":
+        return read_amc(path, skeleton_path)
+    hint = "; an ASF is only a skeleton, the motion is in its AMC files" if suffix == ".asf" else ""
+    raise FileError(f"is no recording that can be read; readable are {_listed(RECORDINGS)}{hint}", path=path)
+
+
+def _listed(known: Mapping[str, str]) -> str:
+    return ", ".join(f"*{suffix} ({what})" for suffix, what in known.items())
+
+
+def _subject(path: Path) -> str:
+    match = re.fullmatch(r"(\d+)_\d+.*", path.stem)
+    return match.group(1) if match else path.absolute().parent.name

@@ -1,0 +1,1 @@
+"""Pure arrays; knows no body."""

@@ -1,0 +1,1 @@
+"""From a wish to lawful movement of the vehicle."""

@@ -1,0 +1,1 @@
+"""From movement to a body: blending, seams, feet."""

@@ -1,0 +1,85 @@
+"""What every test stands on: run-time type checks of the package, the recordings, a body."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from beartype import BeartypeConf, beartype
+from hypothesis import HealthCheck, settings
+from jaxtyping import config, install_import_hook
+
+TESTS = Path(__file__).resolve().parent
+ROOT = TESTS.parent
+SOURCES = ROOT / "src"
+
+# numba compiles these: a wrapped function is none that it can read
+COMPILED = ("kernels",)
+
+typechecked = beartype(conf=BeartypeConf(is_pep484_tower=True))  # an int will do where a float is asked for
+
+
+def checked_modules() -> list[str]:
+    """Every module of the package whose shapes and types are checked while tests run (packages only re-export)."""
+    names = []
+    for path in sorted(SOURCES.rglob("*.py")):
+        compiled = path.stem in COMPILED or path.stem.endswith("_kernels")
+        if path.stem not in ("__init__", "__main__") and not compiled:
+            names.append(".".join(path.relative_to(SOURCES).with_suffix("").parts))
+    return names
+
+
+loaded = sorted(name for name in sys.modules if name.split(".")[0] == "stridecast")
+if loaded:
+    raise pytest.UsageError(f"imported before the type checks were in place: {', '.join(loaded)}")
+install_import_hook(checked_modules(), f"{__name__}.typechecked")
+
+from bodies import humanoid  # noqa: E402
+from stridecast.model.skeleton import Skeleton  # noqa: E402
+
+settings.register_profile(
+    "default", deadline=None, max_examples=40, suppress_health_check=[HealthCheck.too_slow], print_blob=True
+)
+settings.register_profile("ci", settings.get_profile("default"), max_examples=150, derandomize=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what needs the recordings, so that ``-m "not mocap"`` leaves it out."""
+    for item in items:
+        if "mocap" in getattr(item, "fixturenames", ()):
+            item.add_marker("mocap")
+
+
+def absent(what: str, reason: str) -> None:
+    """Skip a test that lacks something, or fail it where ``STRIDECAST_REQUIRE`` says that it must be there."""
+    if what in os.environ.get("STRIDECAST_REQUIRE", "").replace(" ", "").split(","):
+        pytest.fail(f"{reason}, and STRIDECAST_REQUIRE asks for {what}")
+    pytest.skip(reason)
+
+
+@pytest.fixture(scope="session")
+def mocap() -> Path:
+    """Folder of the recordings: ``STRIDECAST_MOCAP``, or ``shared/mocap`` beside the repository."""
+    named = os.environ.get("STRIDECAST_MOCAP")
+    folder = Path(named) if named else ROOT.parent / "shared" / "mocap"
+    if not folder.is_dir():
+        absent("mocap", f"no recordings in {folder} (STRIDECAST_MOCAP names another folder)")
+    return folder
+
+
+@pytest.fixture
+def unchecked() -> Iterator[None]:
+    """Switch the type checks off, to see what the package itself says to arrays of the wrong shape."""
+    config.update("jaxtyping_disable", True)
+    yield
+    config.update("jaxtyping_disable", False)
+
+
+@pytest.fixture(scope="session")
+def skeleton() -> Skeleton:
+    """The humanoid of ``bodies``: 24 joints, left and right alike, all roles."""
+    return humanoid()
