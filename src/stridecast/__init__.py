@@ -1,1 +1,100 @@
-"""stridecast: on-line human locomotion from motion capture."""
+"""stridecast: on-line human locomotion from motion capture.
+
+    >>> import stridecast as sc
+    >>> database = sc.build(["recordings/"])            # doctest: +SKIP
+    >>> walker = sc.Walker(database)                    # doctest: +SKIP
+    >>> pose = walker.step((0.0, 1.5), motion="walk")   # doctest: +SKIP
+
+Names are loaded when they are first used, so that importing the package costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from stridecast.building.build import build
+    from stridecast.errors import (
+        DatabaseError,
+        DatabaseFileError,
+        FileError,
+        InputError,
+        MotionError,
+        SkeletonError,
+        StridecastError,
+        TakeError,
+        WishError,
+    )
+    from stridecast.formats.bvh import write_bvh
+    from stridecast.formats.recordings import load_motion, load_skeleton
+    from stridecast.formats.store import load_database, save_database
+    from stridecast.model.database import MotionDatabase
+    from stridecast.model.motion import Motion
+    from stridecast.model.pose import Pose, VehicleState
+    from stridecast.model.skeleton import Skeleton
+    from stridecast.steering.force import SteeringGains
+    from stridecast.synthesis.walker import Walker, Walkers
+
+_HOME = {
+    "build": "building.build",
+    "load_database": "formats.store",
+    "save_database": "formats.store",
+    "load_motion": "formats.recordings",
+    "load_skeleton": "formats.recordings",
+    "write_bvh": "formats.bvh",
+    "Motion": "model.motion",
+    "MotionDatabase": "model.database",
+    "Pose": "model.pose",
+    "VehicleState": "model.pose",
+    "Skeleton": "model.skeleton",
+    "SteeringGains": "steering.force",
+    "Walker": "synthesis.walker",
+    "Walkers": "synthesis.walker",
+    "DatabaseError": "errors",
+    "DatabaseFileError": "errors",
+    "FileError": "errors",
+    "InputError": "errors",
+    "MotionError": "errors",
+    "SkeletonError": "errors",
+    "StridecastError": "errors",
+    "TakeError": "errors",
+    "WishError": "errors",
+}
+
+__version__ = "0.1.0"
+__all__ = [  # noqa: RUF022
+    "build",
+    "load_database",
+    "save_database",
+    "load_motion",
+    "load_skeleton",
+    "write_bvh",
+    "Motion",
+    "MotionDatabase",
+    "Pose",
+    "VehicleState",
+    "Skeleton",
+    "SteeringGains",
+    "Walker",
+    "Walkers",
+    "DatabaseError",
+    "DatabaseFileError",
+    "FileError",
+    "InputError",
+    "MotionError",
+    "SkeletonError",
+    "StridecastError",
+    "TakeError",
+    "WishError",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'stridecast' has no attribute {name!r}")
+    return getattr(import_module(f"stridecast.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -39,6 +39,28 @@ def test_standing_it_is_at_hip_height_between_the_legs(skeleton):
     assert 0.55 < centre[0, 1] / stature < 0.60
 
 
+def test_height_is_the_sum_of_the_parts_by_hand(skeleton):
+    """The T-pose added up from the published figures: mass times height of each centre, floor at 0."""
+    hips, neck, head, arm = 0.92, 1.50, 1.59, 1.44
+    trunk = 0.1182 * 0.122 + 0.1549 * 0.458 + 0.15705 * 0.805
+    parts = 0.43015 * hips + trunk * (neck - hips) + 0.0681 * head
+    parts += 2 * (0.1447 * (0.92 - 0.385 * 0.43) + 0.0457 * (0.49 - 0.444 * 0.42) + 0.0133 * (0.07 - 0.4 * 0.06))
+    parts += 2 * (0.0263 + 0.0150 + 0.00585) * arm
+    centre = mass.center_of_mass(skeleton, kinematics.pose(standing(skeleton, frames=1)))
+    assert centre[0, 1] == pytest.approx(parts / 0.99995, abs=1e-4)
+
+
+def test_without_a_neck_the_trunk_is_measured_by_the_shoulders(skeleton):
+    """The shoulder joints are 83 % of the way from the hip joints to the neck; put there, they tell the same."""
+    offsets = skeleton.offsets.copy()
+    for side in ("left", "right"):
+        offsets[skeleton.joint(f"{side}_shoulder"), 1] = 0.92 + 0.83 * (1.50 - 0.92) - 1.30
+    body = replace(skeleton, offsets=offsets)
+    still = kinematics.pose(standing(body, frames=1))
+    whole, part = (mass.center_of_mass(body, still) for body in (body, without(body, {"neck"})))
+    np.testing.assert_allclose(part, whole, atol=1e-3)
+
+
 def test_a_part_moves_it_by_its_mass(skeleton):
     """Independent of the tables' layout: bend one elbow and the forearm's mass moves by the arc of its own centre."""
     still, bent = standing(skeleton, frames=1), quat.from_euler(np.array([np.pi / 2]), "Z")

@@ -12,11 +12,11 @@ from stridecast.geometry import ground, signals
 from stridecast.model.contacts import SIDES, Contacts
 from stridecast.model.motion import Motion
 
-ENTER_SPEED = (0.35, 0.22)
+ENTER_SPEED = (0.35, 0.18)
 """A foot comes to stand below this speed: m/s for a leg of one metre, plus a share of the walker's own speed (a runner's
 soft shoe rolls faster than a walker's)."""
 
-LEAVE_SPEED = (0.55, 0.33)
+LEAVE_SPEED = (0.45, 0.22)
 """It leaves above this speed, the same way."""
 
 NEAR_FLOOR = 0.075

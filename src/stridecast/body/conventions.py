@@ -1,4 +1,4 @@
-"""From a recording as a file has it to a ``Motion`` as the package wants it: metres, +Y up, facing +Z at rest, no T-pose.
+"""From a recording as a file has it to a ``Motion``: in metres, +Y up, facing +Z at rest, without T-pose.
 
 A column of small repairs; each says in a note what it did, so that the user can overrule it.
 """
@@ -28,7 +28,7 @@ UNITS: Mapping[str, float] = {
     "decimetres": 0.1,
     "feet": 0.3048,
 }
-"""Units that recordings come in, metres each. The CMU database counts inches divided by the scale 0.45 of its ASF files."""
+"""Units that recordings come in, metres each. CMU's are inches divided by the scale 0.45 that its ASF files state."""
 
 ADULT_LEG = (0.7, 1.0)
 """Hip to ankle of an adult, metres; it tells the unit of a file that does not."""
@@ -100,6 +100,7 @@ def to_motion(
     frames = len(recording.root_positions)
     if frames < 2:
         raise MotionError(f"{before}a motion needs at least 2 frames, not {frames}")
+    _check_numbers(recording, before)
     recording, skeleton = _body(recording, roles, notes)
     unit = _unit(skeleton, recording.unit, scale, notes)
     _check_slides(recording, skeleton, unit, before, notes)
@@ -129,6 +130,14 @@ def to_skeleton(
     recording, skeleton = _body(recording, roles, notes)
     skeleton = _scaled(skeleton, _unit(skeleton, recording.unit, scale, notes))
     return _skeleton_rested(skeleton, _rest_turn(skeleton, notes)), tuple(notes)
+
+
+def _check_numbers(recording: RawRecording, before: str) -> None:
+    for numbers in (recording.rotations, recording.root_positions[:, None]):
+        bad = np.argwhere(~np.isfinite(numbers))
+        if len(bad):
+            frame, joint = bad[0, :2]
+            raise MotionError(f"{before}frame {frame}: joint {recording.names[joint]!r} is not finite")
 
 
 def _body(
@@ -180,9 +189,7 @@ def _frame_rate(stated: float | None, given: float | None, notes: list[str]) -> 
     return float(usual) if abs(usual - stated) < 1.5e-3 * stated else stated
 
 
-def _check_slides(
-    recording: RawRecording, skeleton: Skeleton, unit: float, before: str, notes: list[str]
-) -> None:
+def _check_slides(recording: RawRecording, skeleton: Skeleton, unit: float, before: str, notes: list[str]) -> None:
     """Bones keep their length: refuse legs that do not, and tell of other joints that are held from now on."""
     legs = {skeleton.roles[role] for role in REQUIRED_ROLES}
     for joint, places in recording.slides.items():
@@ -206,7 +213,8 @@ def _without_t_pose(motion: Motion, notes: list[str]) -> Motion:
         return motion
     turns = np.linalg.norm(quat.log(quat.multiply(q[1:], quat.inverse(q[:-1]))), axis=-1)
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=-1) * motion.frame_rate
-    jumps = int(np.count_nonzero((turns[0] > 3.0 * turns[1:].max(axis=0)) & (turns[0] > max(0.25, 10.0 / motion.frame_rate))))
+    least = np.maximum(3.0 * turns[1:].max(axis=0), max(0.25, 10.0 / motion.frame_rate))
+    jumps = np.count_nonzero(turns[0] > least)
     leaps = speeds[0] > LARGEST_SPEED >= speeds[1:].max()
     if jumps < LEAST_JUMPS and not leaps:
         return motion
@@ -216,7 +224,7 @@ def _without_t_pose(motion: Motion, notes: list[str]) -> Motion:
 
 
 def _axis(direction: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """The signed axis nearest to a direction."""
+    """Find the signed axis nearest to a direction."""
     widest = int(np.argmax(np.abs(direction)))
     return np.eye(3)[widest] * (-1.0 if direction[widest] < 0 else 1.0)
 
@@ -229,7 +237,7 @@ def _axis_named(up: str) -> Float[np.ndarray, "3"]:
 
 
 def _top(skeleton: Skeleton) -> int:
-    """The highest joint of the trunk that is known."""
+    """Choose the highest joint of the trunk that is known."""
     return next(skeleton.roles[role] for role in ("head", "neck", "chest", "hips") if role in skeleton.roles)
 
 
@@ -240,7 +248,7 @@ def _some_frames(motion: Motion) -> Float[np.ndarray, "frames joints 3"]:
 
 
 def _axis_found(motion: Motion, notes: list[str]) -> Float[np.ndarray, "3"]:
-    """The axis of the recording that points up: the head is that way from the feet."""
+    """Find the axis of the recording that points up: the head is that way from the feet."""
     skeleton, places = motion.skeleton, _some_frames(motion)
     feet = places[:, skeleton.chain("left_foot", "right_foot")].mean(axis=1)
     axis = _axis((places[:, _top(skeleton)] - feet).mean(axis=0))
@@ -268,7 +276,7 @@ def _with_root_offset(
 
 
 def _turned(motion: Motion, turn: Float[np.ndarray, "4"]) -> Motion:
-    """The whole recording turned in the world."""
+    """Turn the whole recording in the world."""
     if turn[0] == 1.0:
         return motion
     rotations = motion.rotations.copy()
@@ -277,10 +285,10 @@ def _turned(motion: Motion, turn: Float[np.ndarray, "4"]) -> Motion:
 
 
 def _rest_turn(skeleton: Skeleton, notes: list[str]) -> Float[np.ndarray, "4"]:
-    """The rotation that makes a rest pose stand upright and face +Z.
+    """Find the rotation that makes a rest pose stand upright and face +Z.
 
-    Rest poses that are no pose (bones all along one axis, as in LaFAN1) have a pelvis nevertheless: up is then where the
-    spine leaves it.
+    Rest poses that are no pose (bones all along one axis, as in LaFAN1) have a pelvis nevertheless: up is then where
+    the spine leaves it.
     """
     places = kinematics.rest(skeleton).positions
     left, right = places[skeleton.chain("left_thigh", "right_thigh")]
@@ -312,7 +320,7 @@ def _skeleton_rested(skeleton: Skeleton, turn: Float[np.ndarray, "4"]) -> Skelet
 
 
 def _rested(motion: Motion, turn: Float[np.ndarray, "4"]) -> Motion:
-    """The same movement of a skeleton whose rest pose is turned."""
+    """Give the skeleton another rest pose, turned, and keep its movement."""
     if turn[0] == 1.0:
         return motion
     rotations = quat.multiply(motion.rotations, quat.inverse(turn))

@@ -47,7 +47,7 @@ class RawRecording:
 
 
 def body_of(recording: RawRecording, roles: Mapping[str, int]) -> Skeleton:
-    """The recording's skeleton, in its unit and axes."""
+    """Make the recording's skeleton, in its unit and axes."""
     offsets = recording.offsets.copy()
     offsets[0] = 0.0
     return Skeleton(
@@ -63,7 +63,7 @@ def body_of(recording: RawRecording, roles: Mapping[str, int]) -> Skeleton:
 def rooted_at_hips(
     recording: RawRecording, roles: Mapping[str, int], notes: list[str]
 ) -> tuple[RawRecording, dict[str, int]]:
-    """Fold joints above the hips (a root on the floor, a reference node) into the root; leave out what else hangs there.
+    """Fold joints above the hips (a root on the floor, say) into the root, and leave out what else hangs there.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def with_toes(
 
 
 def _with_joint_at_end(recording: RawRecording, end: int, name: str) -> RawRecording:
-    """The end of a bone made a joint that never turns."""
+    """Make the end of a bone a joint that never turns."""
     still = np.broadcast_to(quat.IDENTITY, (len(recording.rotations), 1, 4))
     return replace(
         recording,

@@ -1,7 +1,7 @@
 """What part of the body a joint is, from its name and its place in the tree.
 
-Limbs are known by name: every family of skeletons has its own words for them, and one word may mean different joints
-(``LeftShoulder`` is the clavicle of one family and the upper arm of another), so the family that explains most joints is
+Limbs are known by name. Every family of skeletons has its own words for them, and one word may mean different joints:
+``LeftShoulder`` is the clavicle of one family and the upper arm of another. So the family that explains most joints is
 chosen whole. The trunk is known by its place: the hips are where legs and head meet, the chest is where the arms hang.
 """
 
@@ -103,7 +103,7 @@ FAMILIES: Mapping[str, Limbs] = {
         "hand": ("hand_{l}",),
     },
 }
-"""Families of skeletons: the names of their limbs' joints, ``{Left}``, ``{L}``, ``{l}`` standing for the side's spelling."""
+"""Families of skeletons and what they call the joints of limbs; ``{Left}``, ``{L}`` and ``{l}`` stand for the side."""
 
 _SIDES = (("left", {"Left": "Left", "L": "L", "l": "l"}), ("right", {"Left": "Right", "L": "R", "l": "r"}))
 
@@ -161,12 +161,12 @@ def _limbs(names: Sequence[str]) -> dict[str, int]:
 
 
 def _plain(names: Sequence[str]) -> list[str]:
-    """Names without namespace (``mixamorig:``), without what all but the root begin with (``Bip01 ``), case and marks."""
+    """Strip namespaces (``mixamorig:``), what nearly all begin with (``Bip01 ``), case and marks."""
     bare = [name.rpartition(":")[2] for name in names]
-    first, last = min(bare[1:], default=""), max(bare[1:], default="")
-    shared = next((k for k, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), 0)
-    prefix = first[: max(first.rfind(mark, 0, shared) for mark in "_ .-") + 1]
-    return [_squeeze(name.removeprefix(prefix)) for name in bare]
+    middle = sorted(bare)[len(bare) // 2] if bare else ""
+    starts = [middle[: mark.end()] for mark in re.finditer(r"[\s_.-]", middle)]
+    shared = [start for start in starts if sum(name.startswith(start) for name in bare) > 0.75 * len(bare)]
+    return [_squeeze(name.removeprefix(max(shared, key=len, default=""))) for name in bare]
 
 
 def _squeeze(name: str) -> str:
@@ -202,7 +202,7 @@ def _trunk(names: Sequence[str], parents: Sequence[int], roles: Mapping[str, int
 
 
 def _line(parents: Sequence[int], joint: int) -> list[int]:
-    """The joint and its ancestors, the root last."""
+    """List the joint and its ancestors, the root last."""
     line = [joint]
     while parents[line[-1]] >= 0:
         line.append(int(parents[line[-1]]))
@@ -210,12 +210,12 @@ def _line(parents: Sequence[int], joint: int) -> list[int]:
 
 
 def _meeting(parents: Sequence[int], joints: Sequence[int]) -> int:
-    """The nearest joint that is above (or one of) all these joints."""
+    """Find the nearest joint that is above (or one of) all these joints."""
     shared = set.intersection(*(set(_line(parents, joint)) for joint in joints))
     return max(shared)  # parents come before children
 
 
 def _between(parents: Sequence[int], top: int, bottom: int) -> list[int]:
-    """The joints strictly between an ancestor and its descendant, from the ancestor on; none if it is no ancestor."""
+    """List the joints strictly between an ancestor and its descendant, top down; none if it is no ancestor."""
     line = _line(parents, bottom)
     return line[1 : line.index(top)][::-1] if top in line[1:] else []

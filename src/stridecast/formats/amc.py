@@ -125,7 +125,7 @@ class _Reader:
         return degrees, rows
 
     def in_step(self, rows: list[_Row]) -> list[_Row]:
-        """Lines of the bones in the order of the skeleton, if every frame has the same lines in the same order; else none."""
+        """Lines of the bones in the skeleton's order, if every frame has the same lines in one order; else none."""
         size = len(self.labels) + 1
         labels = [row.label for row in rows]
         first = labels[1:size]
@@ -138,7 +138,7 @@ class _Reader:
         return [rows[start + k] for start in range(0, len(rows), size) for k in order]
 
     def sorted_out(self, rows: list[_Row]) -> list[_Row]:
-        """The same for frames whose lines differ in order; says which line is wrong where one is."""
+        """Do the same for frames whose lines differ in order, and say which line is wrong where one is."""
         starts = [k for k, row in enumerate(rows) if row.label.isdigit() and not row.rest]
         self.check_count([rows[k] for k in starts])
         bones: list[_Row] = []

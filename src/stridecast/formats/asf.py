@@ -1,8 +1,8 @@
 """ASF, the Acclaim skeleton, that AMC recordings need.
 
-A bone has a direction and a length in the axes of the world, and axes of its own about which its degrees of freedom turn
-it. A joint here is where a bone starts and has the bone's name; the bones below the root start at the root. Angles about
-X, Y and Z are applied in the order in which the letters stand after ``axis``: ``XYZ`` is ``Rz * Ry * Rx``.
+A bone has a direction and a length in the axes of the world, and axes of its own about which its degrees of freedom
+turn it. A joint here is where a bone starts and has the bone's name; the bones below the root start at the root. Angles
+about X, Y and Z are applied in the order in which the letters stand after ``axis``: ``XYZ`` is ``Rz * Ry * Rx``.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class AsfSkeleton:
     orders
         ``X``, ``Y``, ``Z`` in the order in which the turns of each bone are applied.
     freedoms
-        What an AMC gives for each bone, in its order: ``rx``, ``ry``, ``rz``, and for the root also ``tx``, ``ty``, ``tz``.
+        What an AMC gives for each bone, in its order: some of ``rx ry rz``, for the root also of ``tx ty tz``.
     unit
         Metres per unit, if the file says.
     degrees
@@ -66,7 +66,7 @@ class AsfSkeleton:
     def posed(
         self, root_positions: Float[np.ndarray, "frames 3"], rotations: Float[np.ndarray, "frames joints 4"]
     ) -> RawRecording:
-        """A recording of this skeleton."""
+        """Make a recording of this skeleton."""
         return RawRecording(
             names=self.names,
             parents=self.parents,
@@ -84,7 +84,7 @@ class AsfSkeleton:
 
 
 def applied(angles: Float[np.ndarray, "*shape 3"], order: str) -> Float[np.ndarray, "*shape 4"]:
-    """Turns by ``angles`` (radians) about X, Y and Z, about the axis whose letter comes first in ``order`` first."""
+    """Turn by ``angles`` (radians) about X, Y and Z, first about the axis whose letter comes first in ``order``."""
     backwards = order[::-1]
     return quat.from_euler(angles[..., ["XYZ".index(letter) for letter in backwards]], backwards)
 
@@ -180,7 +180,9 @@ class _Reader:
         found = tuple(word.lower() for word in words)
         for word in found:
             if word not in known or found.count(word) > 1:
-                self.fail(f"{whose} cannot have the degree of freedom {word[:20]!r} here; it may have {' '.join(known)}")
+                self.fail(
+                    f"{whose} cannot have the degree of freedom {word[:20]!r} here; it may have {' '.join(known)}"
+                )
         return found
 
     def read_units(self, keyword: str, words: list[str]) -> None:

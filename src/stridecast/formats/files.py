@@ -10,6 +10,9 @@ from typing import BinaryIO
 
 from stridecast.errors import FileError
 
+_START = 4096
+"""Bytes in which the signs of a format are looked for."""
+
 _SIGNS = (
     (b"hierarchy", "a BVH recording"),
     (b"#!oml:asf", "an AMC recording"),
@@ -35,7 +38,7 @@ _BINARY_SIGNS = (
 
 
 def looks_like(data: bytes) -> str:
-    """Name what a file holds from its first bytes: "a BVH recording", "an FBX file", ..., or "" where no sign is known."""
+    """Name what a file holds from its first bytes, as "a BVH recording" or "an FBX file"; "" where nothing tells."""
     for sign, name in _BINARY_SIGNS:
         if data.startswith(sign):
             return name
@@ -43,9 +46,24 @@ def looks_like(data: bytes) -> str:
         return "a C3D file"
     if b"\0" in data:
         return "binary data"
-    head = data[:4096].lower()
+    head = data[:_START].lower()
     found = [(head.find(sign), name) for sign, name in _SIGNS if sign in head]
     return min(found)[1] if found else ""
+
+
+def read_start(path: str | Path) -> bytes:
+    """First bytes of a file, enough for ``looks_like``.
+
+    Raises
+    ------
+    FileError
+        No such file, or not readable.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(_START)
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror or error}", path=path) from error
 
 
 def read_text(path: str | Path) -> bytes:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+_FURTHEST = 100_000
+"""Exponents beyond this are as good as this."""
+
 _POWERS = np.array([float(f"1e{exponent}") for exponent in range(309)])
 _MOST = (10**18 - 10) // 10
-"""With more digits than this the next no longer changes a float of 53 bits, and might overflow the 64 they are gathered in."""
+"""Above this, further digits change no float of 53 bits, and would overflow the 64 bits they are gathered in."""
 
 
 @njit(cache=True, nogil=True)
 def count_tokens(text: np.ndarray) -> int:
+    """Count the words of a text."""
     count = 0
     outside = True
     for byte in text:
@@ -25,7 +29,7 @@ def count_tokens(text: np.ndarray) -> int:
 
 @njit(cache=True, nogil=True)
 def _scaled(mantissa: int, exponent: int) -> float:
-    """``mantissa * 10**exponent``; exact powers and a single rounding for all numbers of up to 15 digits in ordinary ranges."""
+    """``mantissa * 10**exponent``; up to 15 digits and the 22nd power of ten both are exact, so it is rounded once."""
     value = float(mantissa)
     if mantissa == 0 or exponent == 0:
         return value
@@ -40,7 +44,7 @@ def _scaled(mantissa: int, exponent: int) -> float:
 def read(
     text: np.ndarray, place: int, row: int, values: np.ndarray, rows: np.ndarray, done: int
 ) -> tuple[int, int, int]:
-    """Fill ``values`` from ``place`` on, up to the end or to a token that is no plain number; returns where it stopped."""
+    """Fill ``values`` from ``place`` on, up to the end or to a word that is no number; return where it stopped."""
     size = len(text)
     while True:
         while place < size and text[place] <= 32:
@@ -59,7 +63,7 @@ def read(
             if 0 <= digit <= 9:
                 digits += 1
                 if mantissa <= _MOST:
-                    mantissa = mantissa * 10 + digit
+                    mantissa = mantissa * 10 + int(digit)
                     exponent -= after_point
                 else:
                     exponent += not after_point
@@ -76,7 +80,9 @@ def read(
                 place += 1
             power, digits = 0, 0
             while place < size and 48 <= text[place] <= 57:
-                power = min(power * 10 + np.int64(text[place]) - 48, 100_000)
+                power = power * 10 + int(np.int64(text[place])) - 48
+                if power > _FURTHEST:
+                    power = _FURTHEST
                 digits += 1
                 place += 1
             good = digits > 0

@@ -12,6 +12,7 @@ from stridecast.errors import FileError, SkeletonError
 from stridecast.formats.amc import read_amc
 from stridecast.formats.asf import read_asf
 from stridecast.formats.bvh import read_bvh
+from stridecast.formats.files import looks_like, read_start
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
 
@@ -37,7 +38,7 @@ def load_motion(
     Parameters
     ----------
     path
-        A BVH or AMC file, known by its suffix.
+        A BVH or AMC file, known by its suffix, else by its first words.
     roles
         Joints of the body whose names are unusual, role to joint name; the others are found by their names.
     scale
@@ -83,7 +84,7 @@ def load_recording(
     skeleton_path: str | Path | None = None,
     subject: str | None = None,
 ) -> tuple[Motion, tuple[str, ...]]:
-    """Load a recording as ``load_motion`` does; also tell, in a sentence each, what was guessed, turned, dropped or added."""
+    """Load a recording as ``load_motion`` does, with notes of what was guessed, turned, dropped or added."""
     path = Path(path)
     recording = _read(path, skeleton_path)
     try:
@@ -101,9 +102,7 @@ def load_recording(
         raise SkeletonError(f"{path}: {error}") from None
 
 
-def load_skeleton(
-    path: str | Path, *, roles: Mapping[str, str] | None = None, scale: float | None = None
-) -> Skeleton:
+def load_skeleton(path: str | Path, *, roles: Mapping[str, str] | None = None, scale: float | None = None) -> Skeleton:
     """Load only the skeleton of a BVH or ASF file; parameters and errors as of ``load_motion``."""
     path = Path(path)
     suffix = path.suffix.lower()
@@ -118,11 +117,14 @@ def load_skeleton(
 
 def _read(path: Path, skeleton_path: str | Path | None) -> RawRecording:
     suffix = path.suffix.lower()
-    if suffix == ".bvh":
+    seems = looks_like(read_start(path)) if suffix not in RECORDINGS else ""
+    if suffix == ".bvh" or "BVH" in seems:
         return read_bvh(path)
-    if suffix == ".amc":
+    if suffix == ".amc" or "AMC" in seems:
         return read_amc(path, skeleton_path)
-    hint = "; an ASF is only a skeleton, the motion is in its AMC files" if suffix == ".asf" else ""
+    hint = f"; it looks like {seems}" if seems else ""
+    if suffix == ".asf":
+        hint = "; an ASF is only a skeleton, the motion is in its AMC files"
     raise FileError(f"is no recording that can be read; readable are {_listed(RECORDINGS)}{hint}", path=path)
 
 

@@ -83,6 +83,8 @@ class Skeleton:
             )
         if self.end_offsets.shape != (len(self.end_joints), 3):
             raise SkeletonError("end_joints and end_offsets differ in length")
+        if ((self.end_joints < 0) | (self.end_joints >= count)).any():
+            raise SkeletonError(f"end_joints must be joints of the skeleton, 0 to {count - 1}")
         if len(set(self.names)) != count:
             twice = sorted({name for name in self.names if self.names.count(name) > 1})
             raise SkeletonError(f"joint names must be unique; these stand twice: {', '.join(twice)}")

@@ -1,0 +1,104 @@
+"""Blended features at generic time, the time warp, and seams (BJL 4.2, KS05)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stridecast.geometry.kernels import decay, kernel, wrap
+from stridecast.model.database import MARGIN
+from stridecast.synthesis.state import NEIGHBOURS, State
+from stridecast.synthesis.tables import Tables
+
+SEAM_HALF_LIFE = 0.12
+"""Half of the difference at a boundary is gone after this, seconds."""
+
+
+@kernel
+def spline_weights(u: float) -> tuple[float, float, float, float]:
+    """Catmull-Rom weights of four neighbouring samples, ``u`` of the way from the second to the third."""
+    u2, u3 = u * u, u * u * u
+    return (
+        0.5 * (-u3 + 2.0 * u2 - u),
+        0.5 * (3.0 * u3 - 5.0 * u2 + 2.0),
+        0.5 * (-3.0 * u3 + 4.0 * u2 + u),
+        0.5 * (u3 - u2),
+    )
+
+
+@kernel
+def row_of(generic: float, rows: int) -> tuple[int, float]:
+    """Sample at or before a generic time, and how far on from it."""
+    at = MARGIN + generic * (rows - 1 - 2 * MARGIN)
+    i = min(max(int(math.floor(at)), 1), rows - 3)
+    return i, at - i
+
+
+@kernel
+def seconds_per_generic(tables: Tables, state: State, c: int) -> float:
+    """Slope of the blended time warp where the character is (incremental time warping, Park et al. 2002)."""
+    rows = tables.times.shape[1]
+    i, u = row_of(state.generic[c], rows)
+    slope = 0.0
+    u2 = u * u
+    d0, d1 = 0.5 * (-3.0 * u2 + 4.0 * u - 1.0), 0.5 * (9.0 * u2 - 10.0 * u)
+    d2, d3 = 0.5 * (-9.0 * u2 + 8.0 * u + 1.0), 0.5 * (3.0 * u2 - 2.0 * u)
+    for n in range(NEIGHBOURS):
+        w = state.weights[c, n]
+        if w > 0.0:
+            t = tables.times[state.chosen[c, n]]
+            slope += w * (d0 * t[i - 1] + d1 * t[i] + d2 * t[i + 1] + d3 * t[i + 2])
+    return max(slope * (rows - 1 - 2 * MARGIN), 0.02)
+
+
+@kernel
+def blended(tables: Tables, state: State, c: int, generic: float, out: np.ndarray) -> None:
+    """Weighted sum of the chosen examples' features at a generic time."""
+    rows = tables.features.shape[1]
+    i, u = row_of(generic, rows)
+    b = spline_weights(u)
+    out[:] = 0.0
+    for n in range(NEIGHBOURS):
+        w = state.weights[c, n]
+        if w > 0.0:
+            f = tables.features[state.chosen[c, n]]
+            w0, w1, w2, w3 = w * b[0], w * b[1], w * b[2], w * b[3]
+            for k in range(len(out)):
+                out[k] += w0 * f[i - 1, k] + w1 * f[i, k] + w2 * f[i + 1, k] + w3 * f[i + 2, k]
+
+
+@kernel
+def open_seam(tables: Tables, state: State, c: int, meant: np.ndarray, dt: float) -> None:
+    """Take down by how much a new segment differs from where the last frames were heading (inertialization)."""
+    ahead = np.empty(len(meant))
+    du = dt / seconds_per_generic(tables, state, c)
+    blended(tables, state, c, state.generic[c] + du, ahead)
+    yaw = len(meant) - 1
+    turns = 2.0 * math.pi * round((state.features[c, yaw] - meant[yaw]) / (2.0 * math.pi))
+    state.features[c, yaw] -= turns
+    state.before[c, yaw] -= turns
+    for k in range(len(meant)):
+        rate = (state.features[c, k] - state.before[c, k]) / dt
+        state.seam[c, k] = state.features[c, k] + rate * dt - meant[k]
+        state.seam_rate[c, k] = rate - (ahead[k] - meant[k]) / dt
+
+
+@kernel
+def show_features(state: State, c: int, meant: np.ndarray) -> None:
+    """Features of this frame: the blend plus what is left of the seam."""
+    for k in range(len(meant)):
+        state.before[c, k] = state.features[c, k]
+        state.features[c, k] = meant[k] + state.seam[c, k]
+    yaw = len(meant) - 1
+    if abs(state.features[c, yaw]) > math.pi:
+        inside = wrap(state.features[c, yaw])
+        state.before[c, yaw] += inside - state.features[c, yaw]
+        state.features[c, yaw] = inside
+
+
+@kernel
+def close_seam(state: State, c: int, dt: float) -> None:
+    """Let the seam fade by one frame."""
+    for k in range(state.seam.shape[1]):
+        state.seam[c, k], state.seam_rate[c, k] = decay(state.seam[c, k], state.seam_rate[c, k], SEAM_HALF_LIFE, dt)

@@ -1,0 +1,166 @@
+"""Which segment comes next, and of which examples it is blended (KS05, KS07 "Adding Details")."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stridecast.database.graph import UNREACHABLE
+from stridecast.geometry.kernels import kernel
+from stridecast.model.database import MARGIN
+from stridecast.synthesis.state import NEIGHBOURS, State
+from stridecast.synthesis.tables import Tables
+
+SPEED_SCALE, TANGENTIAL_SCALE, LATERAL_SCALE = 0.1, 1.2, 0.7
+"""Differences in speed (m/s) and acceleration (m/s2) that weigh as much as each other ..."""
+
+AHEAD = 0.22
+"""Speeds are compared this far into the segment, where the acceleration will have taken them, seconds."""
+
+POSE_SCALE = 0.12
+"""... and as much as a pose that differs by this on average, radians."""
+
+ENTRY_TOLERANCE = 0.2
+"""A transition can begin this far outside the speeds at which its examples began, m/s."""
+
+DETOUR = 2.0
+"""More segments than this are no way to another motion while a blend over nearest poses would do."""
+
+
+@kernel
+def begin_segment(tables: Tables, state: State, c: int, request: int, leftover: float) -> None:
+    """Choose group and examples for the next segment of character ``c``; ``leftover`` seconds of it have passed."""
+    group = next_group(tables, state, c, request)
+    state.group[c] = group
+    blend_nearest(tables, state, c, group)
+    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    state.started[c] = speed
+    state.segments[c] += 1
+    slope = 0.0
+    for n in range(NEIGHBOURS):
+        if state.weights[c, n] > 0.0:
+            e = state.chosen[c, n]
+            slope += state.weights[c, n] * (tables.times[e, MARGIN + 1] - tables.times[e, MARGIN])
+    intervals = tables.times.shape[1] - 1 - 2 * MARGIN
+    state.generic[c] = min(leftover / (slope * intervals), 0.5)
+
+
+@kernel
+def next_group(tables: Tables, state: State, c: int, request: int) -> int:
+    """The group on the shortest way to the motion asked for that the present speed allows."""
+    g = state.group[c]
+    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    if state.fresh[c]:
+        return first_group(tables, state, c, request)
+    best, best_cost = -1, 1e18
+    for h in range(len(tables.first)):
+        if not tables.follows[g, h] or tables.count[h] == 0:
+            continue
+        steps = tables.steps[h, request]
+        cost = 1e9 if steps >= UNREACHABLE else 10.0 * steps
+        # Stay with a transition that is under way, prefer one that is meant for this.
+        if tables.comes_from[h] != tables.leads_to[h]:
+            if tables.leads_to[h] == request:
+                cost -= 2.0
+            if tables.label[h] == tables.label[g]:
+                cost -= 3.0
+            cost += 4.0 * misfit(tables, h, speed)
+            if misfit(tables, h, speed) > ENTRY_TOLERANCE:
+                cost += 1e6
+        cost += min(nearest(tables, state, c, h), 50.0) / 50.0
+        if cost < best_cost:
+            best, best_cost = h, cost
+    if best < 0 or (best_cost > 5e8 and tables.steps[g, request] >= UNREACHABLE):
+        other = first_group(tables, state, c, request)
+        if tables.comes_from[other] == request or best < 0:
+            state.made_up[c] += 1
+            return other
+    return best
+
+
+@kernel
+def misfit(tables: Tables, h: int, speed: float) -> float:
+    """How far a speed lies outside those at which a transition was begun, m/s; slower does for stops, faster for starts."""
+    low, high = tables.entry_speed[h, 0], tables.entry_speed[h, 1]
+    if tables.leads_to[h] < tables.comes_from[h]:
+        return max(speed - high, 0.0)
+    if tables.comes_from[h] == 0:
+        return 0.0
+    return max(low - speed, 0.0)
+
+
+@kernel
+def first_group(tables: Tables, state: State, c: int, request: int) -> int:
+    """The group of a motion whose examples begin nearest to the present pose; of any motion if it has none."""
+    best, best_cost = 0, 1e18
+    for h in range(len(tables.first)):
+        if tables.count[h] == 0:
+            continue
+        cost = nearest(tables, state, c, h)
+        if tables.comes_from[h] != request or tables.leads_to[h] != request:
+            cost += 1e9
+        if cost < best_cost:
+            best, best_cost = h, cost
+    return best
+
+
+@kernel
+def distance(tables: Tables, state: State, c: int, e: int) -> float:
+    """Squared distance of an example's beginning from what the character does: vehicle and pose."""
+    vx, vz = state.velocity[c, 0], state.velocity[c, 1]
+    ax, az = state.acceleration[c, 0], state.acceleration[c, 1]
+    sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
+    more = ax * sine + az * cosine - tables.parameters[e, 1]
+    a = (math.hypot(vx, vz) - tables.parameters[e, 0] + AHEAD * more) / SPEED_SCALE
+    b = more / TANGENTIAL_SCALE
+    d = (ax * cosine - az * sine - tables.parameters[e, 2]) / LATERAL_SCALE
+    total = a * a + b * b + d * d
+    if not state.fresh[c]:
+        pose = 0.0
+        for k in range(tables.features.shape[2]):
+            gap = tables.features[e, MARGIN, k] - state.features[c, k]
+            pose += tables.feature_weights[k] * gap * gap
+        total += 3.0 * pose / (POSE_SCALE * POSE_SCALE)
+    return total
+
+
+@kernel
+def nearest(tables: Tables, state: State, c: int, h: int) -> float:
+    """Smallest distance to any example of a group."""
+    best = 1e18
+    for e in range(tables.first[h], tables.first[h] + tables.count[h]):
+        if tables.allowed[e]:
+            best = min(best, distance(tables, state, c, e))
+    return best
+
+
+@kernel
+def blend_nearest(tables: Tables, state: State, c: int, h: int) -> None:
+    """Weights over the nearest examples of a group: 1/d2 less what the first one left out would get (BJL eq. 3).
+
+    So weights fall to nothing where a neighbour drops out of the blend, and an exact hit takes all the weight.
+    """
+    found = np.full(NEIGHBOURS + 1, 1e18)
+    which = np.zeros(NEIGHBOURS + 1, np.int64)
+    for e in range(tables.first[h], tables.first[h] + tables.count[h]):
+        if not tables.allowed[e]:
+            continue
+        d = distance(tables, state, c, e) + 1e-9
+        if d >= found[NEIGHBOURS]:
+            continue
+        k = NEIGHBOURS
+        while k > 0 and found[k - 1] > d:
+            found[k], which[k] = found[k - 1], which[k - 1]
+            k -= 1
+        found[k], which[k] = d, e
+    total = 0.0
+    for n in range(NEIGHBOURS):
+        w = 1.0 / found[n] - 1.0 / found[NEIGHBOURS] if found[n] < 1e17 else 0.0
+        if n == 0:
+            w = max(w, 1e-12)
+        state.chosen[c, n] = which[n]
+        state.weights[c, n] = w
+        total += w
+    for n in range(NEIGHBOURS):
+        state.weights[c, n] /= total

@@ -1,0 +1,207 @@
+"""One frame of many characters: the step as a column of stages (KS07 "Synthesis")."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stridecast.geometry.kernels import kernel
+from stridecast.steering.kernels import limit, pull
+from stridecast.synthesis.blend_kernels import blended, close_seam, open_seam, seconds_per_generic, show_features
+from stridecast.synthesis.choice_kernels import begin_segment
+from stridecast.synthesis.feet_kernels import plant_feet
+from stridecast.synthesis.pose_kernels import compose
+from stridecast.synthesis.state import State
+from stridecast.synthesis.tables import Tables
+
+STAND, WALK, RUN = 0, 1, 2
+
+SETTLED = 0.15
+"""A point slower than this is at rest, m/s."""
+
+MOVED = 0.12
+"""A character who stands goes on once the point has moved so far, metres."""
+
+LEFT_BEHIND = 0.9
+"""... or is so far away, metres."""
+
+WISH_TO_GO = 0.3
+"""Slower than this nobody starts to walk, m/s; as a force: m/s2."""
+
+WISH_TO_STOP = 0.55
+"""A wished speed below this beside a point at rest is an arrival, m/s."""
+
+
+@kernel
+def step_block(
+    tables: Tables,
+    state: State,
+    points: np.ndarray,
+    forces: np.ndarray,
+    by_force: np.ndarray,
+    motions: np.ndarray,
+    alpha: float,
+    beta: float,
+    dt: float,
+    first: int,
+    last: int,
+) -> None:
+    """Advance characters ``first`` to ``last`` by one frame."""
+    meant = np.empty(tables.features.shape[2])
+    for c in range(first, last):
+        watch_point(state, points, by_force, c, dt)
+        request = motion_wanted(tables, state, points, forces, by_force, motions[c], alpha, beta, c)
+        begun = next_segment_if_due(tables, state, c, request, dt)
+        move_vehicle(tables, state, points, forces, by_force, request, alpha, beta, c, dt)
+        blended(tables, state, c, state.generic[c], meant)
+        if begun and not state.fresh[c]:
+            open_seam(tables, state, c, meant, dt)
+        show_features(state, c, meant)
+        compose(tables, state, c)
+        plant_feet(tables, state, c, dt)
+        close_seam(state, c, dt)
+        state.fresh[c] = False
+
+
+@kernel
+def watch_point(state: State, points: np.ndarray, by_force: np.ndarray, c: int, dt: float) -> None:
+    """How fast the point moves, smoothed over a tenth of a second."""
+    if by_force[c]:
+        return
+    if state.fresh[c]:
+        state.anchor[c, 0], state.anchor[c, 1] = state.position[c, 0], state.position[c, 1]
+    else:
+        speed = math.hypot(points[c, 0] - state.seen[c, 0], points[c, 1] - state.seen[c, 1]) / dt
+        state.seen_speed[c] += (speed - state.seen_speed[c]) * (1.0 - 0.5 ** (dt / 0.07))
+    state.seen[c, 0], state.seen[c, 1] = points[c, 0], points[c, 1]
+
+
+@kernel
+def motion_wanted(
+    tables: Tables,
+    state: State,
+    points: np.ndarray,
+    forces: np.ndarray,
+    by_force: np.ndarray,
+    motion: int,
+    alpha: float,
+    beta: float,
+    c: int,
+) -> int:
+    """The motion asked for; standing, once the point has been reached and rests, or while there is nowhere to go."""
+    if motion == STAND:
+        return STAND
+    standing = tables.leads_to[state.group[c]] == STAND and not state.fresh[c]
+    if by_force[c]:
+        force = math.hypot(forces[c, 0], forces[c, 1])
+        return STAND if standing and force < WISH_TO_GO else motion
+    away = math.hypot(points[c, 0] - state.position[c, 0], points[c, 1] - state.position[c, 1])
+    wish = alpha / beta * away
+    if standing or state.fresh[c]:
+        moved = math.hypot(points[c, 0] - state.anchor[c, 0], points[c, 1] - state.anchor[c, 1])
+        if (moved > MOVED and wish > WISH_TO_GO and state.seen_speed[c] > SETTLED) or away > LEFT_BEHIND:
+            return motion
+        return STAND
+    if state.seen_speed[c] < SETTLED and wish < WISH_TO_STOP:
+        state.anchor[c, 0], state.anchor[c, 1] = points[c, 0], points[c, 1]
+        return STAND
+    if wish < 0.5 * WISH_TO_GO and state.seen_speed[c] < WISH_TO_GO:
+        state.anchor[c, 0], state.anchor[c, 1] = points[c, 0], points[c, 1]
+        return STAND
+    return motion
+
+
+@kernel
+def next_segment_if_due(tables: Tables, state: State, c: int, request: int, dt: float) -> bool:
+    """Let the segment run on by one frame; begin the next where it ends, or at once where standing is to end."""
+    if state.fresh[c]:
+        begin_segment(tables, state, c, request, 0.0)
+        return True
+    slope = seconds_per_generic(tables, state, c)
+    state.generic[c] += dt / slope
+    g = state.group[c]
+    idle = tables.comes_from[g] == STAND and tables.leads_to[g] == STAND
+    if state.generic[c] >= 1.0:
+        begin_segment(tables, state, c, request, (state.generic[c] - 1.0) * slope)
+        return True
+    if idle and request != STAND:
+        begin_segment(tables, state, c, request, 0.0)
+        return True
+    return False
+
+
+@kernel
+def move_vehicle(
+    tables: Tables,
+    state: State,
+    points: np.ndarray,
+    forces: np.ndarray,
+    by_force: np.ndarray,
+    request: int,
+    alpha: float,
+    beta: float,
+    c: int,
+    dt: float,
+) -> None:
+    """Force, clamping, integration: the vehicle's frame (KS07 "Force Extraction", "Clamping Outliers")."""
+    g = state.group[c]
+    u = min(state.generic[c], 1.0)
+    sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
+    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+
+    # The bounds of the group, linear from its first frame to its last; speed from what it was when the segment began.
+    jerk, wide = tables.jerk[g], tables.lateral_per_speed[g]
+    low = (1.0 - u) * tables.tangential[g, 0, 0] + u * tables.tangential[g, 1, 0]
+    high = (1.0 - u) * tables.tangential[g, 0, 1] + u * tables.tangential[g, 1, 1]
+    slowest = (1.0 - u) * min(tables.speed[g, 0, 0], state.started[c]) + u * tables.speed[g, 1, 0]
+    fastest = (1.0 - u) * max(tables.speed[g, 0, 1], state.started[c]) + u * tables.speed[g, 1, 1]
+
+    # The wish, in the vehicle's frame.
+    if by_force[c] and request != STAND:
+        wish_t = forces[c, 0] * sine + forces[c, 1] * cosine
+        wish_l = forces[c, 0] * cosine - forces[c, 1] * sine
+        most = jerk * dt / (wide * dt) if wide > 0.0 else 0.0
+        wish_l = min(max(wish_l, -max(most, wide * speed)), max(most, wide * speed))
+    elif tables.leads_to[g] == STAND:
+        # Coming to rest: at the end of the segment, with nothing left of the acceleration.
+        if tables.comes_from[g] == STAND:
+            wish_t = -speed / max(3.0 * dt, 0.1)
+        else:
+            left = max((1.0 - u) * seconds_per_generic(tables, state, c), 2.0 * dt)
+            wish_t = -2.0 * speed / left if speed > 0.02 else -speed / (2.0 * dt)
+        wish_l = 0.0
+    else:
+        k = alpha / beta
+        x, z = k * (points[c, 0] - state.position[c, 0]), k * (points[c, 1] - state.position[c, 1])
+        along, across = x * sine + z * cosine, x * cosine - z * sine
+        at_least, at_most = slowest, fastest
+        if request == STAND:
+            along, across = 0.0, 0.0
+        now = tables.leads_to[g]
+        if request != now:
+            at_least = max(at_least, min(tables.approach[now, request, 0], fastest))
+            at_most = min(at_most, max(tables.approach[now, request, 1], slowest))
+        wish_t, wish_l, state.side[c] = pull(
+            along, across, speed, at_least, max(at_least, at_most), beta, jerk, state.side[c], dt
+        )
+
+    had_t = state.acceleration[c, 0] * sine + state.acceleration[c, 1] * cosine
+    had_l = state.acceleration[c, 0] * cosine - state.acceleration[c, 1] * sine
+    t, l, least, most, widest, acted = limit(
+        wish_t, wish_l, had_t, had_l, speed, jerk, low, high, wide, slowest, fastest, dt
+    )
+
+    ax, az = t * sine + l * cosine, t * cosine - l * sine
+    vx, vz = state.velocity[c, 0] + ax * dt, state.velocity[c, 1] + az * dt
+    now = math.hypot(vx, vz)
+    state.acceleration[c, 0], state.acceleration[c, 1] = ax, az
+    state.velocity[c, 0], state.velocity[c, 1] = vx, vz
+    state.position[c, 0] += vx * dt
+    state.position[c, 1] += vz * dt
+    if now > 1e-3 and vx * sine + vz * cosine > 0.0:
+        state.heading[c] = math.atan2(vx, vz)
+    bounds = state.bounds[c]
+    bounds[0], bounds[1], bounds[2], bounds[3] = jerk, least, most, widest
+    bounds[4], bounds[5] = min(slowest, now), max(fastest, now)
+    state.acted[c] = acted

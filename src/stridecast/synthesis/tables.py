@@ -1,0 +1,203 @@
+"""The database as compiled code wants it: plain arrays in one named tuple, made once for a walker."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool
+
+from stridecast.body import kinematics
+from stridecast.database.graph import connect
+from stridecast.errors import DatabaseError
+from stridecast.geometry import quaternions as quat
+from stridecast.model.contacts import SIDES
+from stridecast.model.database import MARGIN, MotionDatabase
+from stridecast.model.segment import MOTIONS
+from stridecast.model.skeleton import Skeleton
+from stridecast.analysis.take import SOLE
+
+Array = np.ndarray
+
+MOST_KEYS = 8
+"""No string has more changes of support than this."""
+
+
+class Tables(NamedTuple):
+    """Constants of a walker. First letters of shapes: E examples, R rows, D features, G groups, J joints."""
+
+    # examples
+    features: Array  # E R D
+    times: Array  # E R
+    parameters: Array  # E 3
+    durations: Array  # E
+    allowed: Array  # E, of the chosen subjects
+    # groups
+    first: Array  # G
+    count: Array  # G
+    comes_from: Array  # G, index of a motion
+    leads_to: Array  # G
+    label: Array  # G, equal for groups of one coarse motion
+    follows: Array  # G G
+    steps: Array  # G 3
+    keys: Array  # G MOST_KEYS, padded with 2
+    planted: Array  # G MOST_KEYS+1 2
+    entry_speed: Array  # G 2
+    jerk: Array  # G
+    tangential: Array  # G 2 2, first and last frame, low and high
+    lateral_per_speed: Array  # G
+    speed: Array  # G 2 2
+    approach: Array  # 3 3 2, speed range in which a motion is left for another
+    # pose
+    references: Array  # J-1 4
+    feature_weights: Array  # D
+    parents: Array  # J
+    offsets: Array  # J 3
+    legs: Array  # 2 4: thigh, shin, foot, toe
+    paths: Array  # 2 P: joints from the root to the toe, padded with -1
+    hinges: Array  # 2 3: axis about which the knee bends, in the shin's frame
+    bones: Array  # 2 2: lengths of thigh and shin
+    tips: Array  # 2 3: tips of the toes in the toes' frame; zero where the skeleton has none
+    sole: float  # height of the toe joint of a flat foot
+
+
+def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
+    """Tables of a database, held to one person's examples if ``subject`` is given.
+
+    Raises
+    ------
+    DatabaseError
+        Nobody of that name is in the database, or none of their motions can be walked with.
+    """
+    examples, groups = database.examples, database.groups
+    allowed = _allowed(database, subject)
+    usable = np.array([bool(allowed[g.rows].any()) for g in groups])
+    graph = connect(groups, usable)
+    motions = [m for m in MOTIONS if any(u and g.motion == m for u, g in zip(usable, groups, strict=True))]
+    if not motions:
+        whose = f" of subject {subject}" if subject else ""
+        raise DatabaseError(f"the database holds no standing, walking or running{whose} to synthesise from")
+    labels = sorted({g.motion for g in groups})
+    skeleton = database.skeleton
+    entry = np.array([_range(examples.parameters[g.rows][allowed[g.rows], 0]) for g in groups])
+    return Tables(
+        features=examples.features,
+        times=examples.times,
+        parameters=examples.parameters,
+        durations=examples.durations,
+        allowed=allowed,
+        first=np.array([g.first for g in groups]),
+        count=np.where(usable, [g.count for g in groups], 0),
+        comes_from=np.array([MOTIONS.index(g.comes_from) for g in groups]),
+        leads_to=np.array([MOTIONS.index(g.leads_to) for g in groups]),
+        label=np.array([labels.index(g.motion) for g in groups]),
+        follows=graph.follows,
+        steps=graph.steps,
+        keys=np.array([list(g.keys) + [2.0] * (MOST_KEYS - len(g.keys)) for g in groups]),
+        planted=np.array([_planted(g.string) for g in groups]),
+        entry_speed=entry,
+        jerk=np.array([g.bounds.jerk for g in groups]),
+        tangential=np.array([g.bounds.tangential for g in groups]),
+        lateral_per_speed=np.array([g.bounds.lateral_per_speed for g in groups]),
+        speed=np.array([g.bounds.speed for g in groups]),
+        approach=_approach(database, entry, usable),
+        references=database.references,
+        feature_weights=_feature_weights(skeleton),
+        parents=np.array(skeleton.parents),
+        offsets=np.array(skeleton.offsets),
+        legs=np.array([skeleton.chain(*(f"{s}_{part}" for part in ("thigh", "shin", "foot", "toe"))) for s in SIDES]),
+        paths=_paths(skeleton),
+        hinges=_hinges(database),
+        bones=_bones(skeleton),
+        tips=_tips(skeleton),
+        sole=SOLE * skeleton.leg_length,
+    )
+
+
+def _allowed(database: MotionDatabase, subject: str | None) -> Bool[Array, "examples"]:
+    if subject is None:
+        return np.ones(len(database.examples.durations), bool)
+    if subject not in database.subjects:
+        raise DatabaseError(f"there is no subject {subject!r} in the database; there are {', '.join(database.subjects)}")
+    of_take = np.array([take.subject == subject for take in database.takes])
+    return of_take[database.examples.takes]
+
+
+def _range(values: Array) -> tuple[float, float]:
+    return (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+
+
+def _planted(string: str) -> Array:
+    """Which feet stand in each state of a string."""
+    out = np.zeros((MOST_KEYS + 1, 2), bool)
+    for i, state in enumerate(string):
+        out[i] = (state in "LDS", state in "RDS")
+    return out
+
+
+def _approach(database: MotionDatabase, entry: Array, usable: Array) -> Array:
+    """Range of speeds in which one motion is left for another: those at which its transitions begin."""
+    out = np.zeros((len(MOTIONS), len(MOTIONS), 2))
+    out[..., 1] = np.inf
+    for i, a in enumerate(MOTIONS):
+        leaves = {g.stop for g in database.groups if g.motion == a}
+        for j, b in enumerate(MOTIONS):
+            rows = [
+                k
+                for k, g in enumerate(database.groups)
+                if usable[k] and g.motion == f"{a}-{b}" and g.start in leaves
+            ]
+            if i != j and rows:
+                out[i, j] = entry[rows, 0].min(), entry[rows, 1].max()
+    return out
+
+
+def _feature_weights(skeleton: Skeleton) -> Array:
+    """How much each feature counts when two poses are compared, 1/unit2: limbs and trunk fully, fingers hardly."""
+    counted = {joint for role, joint in skeleton.roles.items() if not role.endswith(("hand", "toe"))}
+    joints = np.array([1.0 if j in counted else 0.05 for j in range(1, skeleton.joints)])
+    rest = [2.0, 2.0, 2.0, 60.0, 60.0, 60.0, 2.0]
+    weights = np.concatenate((np.repeat(joints, 3), rest))
+    return weights / weights[: 3 * (skeleton.joints - 1)].sum()
+
+
+def _paths(skeleton: Skeleton) -> Array:
+    paths = []
+    for side in SIDES:
+        joint, path = skeleton.joint(f"{side}_toe"), []
+        while joint > 0:
+            path.append(joint)
+            joint = int(skeleton.parents[joint])
+        paths.append(path[::-1])
+    longest = max(len(p) for p in paths)
+    return np.array([p + [-1] * (longest - len(p)) for p in paths])
+
+
+def _hinges(database: MotionDatabase) -> Array:
+    """Axis of each knee in the shin's frame: the mean rotation of a knee is a bend, for it bends one way only."""
+    skeleton = database.skeleton
+    out = []
+    for side in SIDES:
+        shin = skeleton.joint(f"{side}_shin")
+        tangents = database.examples.features[:, MARGIN, 3 * (shin - 1) : 3 * shin]
+        bends = quat.log(quat.multiply(database.references[shin - 1], quat.exp(tangents)))
+        axis = bends.mean(axis=0)
+        out.append(axis / np.linalg.norm(axis))
+    return np.array(out)
+
+
+def _bones(skeleton: Skeleton) -> Array:
+    at = kinematics.rest(skeleton).positions
+    legs = [skeleton.chain(*(f"{s}_{part}" for part in ("thigh", "shin", "foot"))) for s in SIDES]
+    return np.array([np.linalg.norm(np.diff(at[leg], axis=0), axis=-1) for leg in legs])
+
+
+
+
+def _tips(skeleton: Skeleton) -> Array:
+    out = np.zeros((2, 3))
+    for i, side in enumerate(SIDES):
+        ends = np.flatnonzero(skeleton.end_joints == skeleton.joint(f"{side}_toe"))
+        if len(ends):
+            out[i] = skeleton.end_offsets[ends[0]]
+    return out
