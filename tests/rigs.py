@@ -57,6 +57,10 @@ FAMILIES: Mapping[str, tuple[str, str]] = {
         "hip abdomenLower abdomenUpper chestUpper neckLower head",
         "{l}ThighBend {l}Shin {l}Foot {l}Toe {l}Collar {l}ShldrBend {l}ForearmBend {l}Hand",
     ),
+    "classic": (
+        "Hips Spine Spine1 Chest Neck Head",
+        "{Left}UpLeg {Left}LowLeg {Left}Foot {Left}Toe {Left}Collar {Left}UpArm {Left}LowArm {Left}Hand",
+    ),
     "SMPL": (
         "Pelvis Spine1 Spine2 Spine3 Neck Head",
         "{L}_Hip {L}_Knee {L}_Ankle {L}_Foot {L}_Collar {L}_Shoulder {L}_Elbow {L}_Wrist",
@@ -121,14 +125,18 @@ def reframed(motion: Motion, frames: np.ndarray) -> Motion:
     return replace(motion, skeleton=other, rotations=kinematics.local(other, turned))
 
 
-def along_x(motion: Motion) -> Motion:
-    """The same movement of a skeleton whose bones all point along +X at zero rotation, as in LaFAN1."""
+def along_x(motion: Motion, mirrored: bool = False) -> Motion:
+    """The same movement of a skeleton whose bones all point along +X at zero rotation, as in LaFAN1.
+
+    Mirrored, the bones of the right side point along -X, as in the Bandai-Namco dataset.
+    """
     skeleton = motion.skeleton
     frames = np.tile(quat.IDENTITY, (skeleton.joints, 1))
     for joint in range(skeleton.joints):
         below = np.flatnonzero(skeleton.parents == joint)
         if len(below):
-            frames[joint] = quat.between(np.array([1.0, 0.0, 0.0]), skeleton.offsets[below[0]])
+            way = -1.0 if mirrored and skeleton.names[joint].startswith("Right") else 1.0
+            frames[joint] = quat.between(np.array([way, 0.0, 0.0]), skeleton.offsets[below[0]])
     return reframed(motion, frames)
 
 

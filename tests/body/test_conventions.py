@@ -100,9 +100,10 @@ def test_a_pelvis_that_is_not_quite_symmetric_is_left_alone():
     assert not any("face" in note for note in notes)
 
 
-def test_a_rest_pose_without_a_pose_has_its_pelvis_turned():
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_rest_pose_without_a_pose_has_its_pelvis_turned(mirrored: bool):
     original = swaying()
-    motion, _ = to_motion(recorded(along_x(original), unit=0.01, family="LaFAN1"))
+    motion, _ = to_motion(recorded(along_x(original, mirrored), unit=0.01, family="LaFAN1"))
     assert_same_movement(motion, original)
     fronts = quat.rotate(motion.rotations[:, 0], FRONT)
     wanted = quat.rotate(original.rotations[:, 0], FRONT)
@@ -213,30 +214,25 @@ def test_up_may_be_said():
 def hung(recording: RawRecording, moving: bool) -> RawRecording:
     """The recording below a root on the floor, that stands still while the hips move, or carries them."""
     height = np.array([0.0, float(np.median(recording.root_positions[:, 1])), 0.0])
-    joints, frames = len(recording.names), len(recording.root_positions)
-    rotations = np.concatenate((np.tile(quat.IDENTITY, (frames, 2, 1)), recording.rotations), axis=1)
-    slide = recording.root_positions if not moving else np.tile(height, (frames, 1))
-    return (
-        replace(
-            recording,
-            names=("Armature", "Prop", *recording.names),
-            parents=np.concatenate(([-1, 0], np.where(recording.parents < 0, 0, recording.parents + 2))),
-            offsets=np.concatenate((np.zeros((2, 3)), height[None], recording.offsets[1:])),
-            end_joints=np.append(recording.end_joints + 2, 1),
-            end_offsets=np.concatenate((recording.end_offsets, np.ones((1, 3)))),
-            root_positions=recording.root_positions - height if moving else np.zeros((frames, 3)),
-            rotations=rotations,
-            slides={} if moving else {2: slide},
-        )
-        if joints
-        else recording
+    frames = len(recording.root_positions)
+    return replace(
+        recording,
+        names=("Armature", "Prop", *recording.names),
+        parents=np.concatenate(([-1, 0], np.where(recording.parents < 0, 0, recording.parents + 2))),
+        offsets=np.concatenate((np.zeros((2, 3)), height[None], recording.offsets[1:])),
+        end_joints=np.append(recording.end_joints + 2, 1),
+        end_offsets=np.concatenate((recording.end_offsets, np.ones((1, 3)))),
+        root_positions=recording.root_positions - height if moving else np.zeros((frames, 3)),
+        rotations=np.concatenate((np.tile(quat.IDENTITY, (frames, 2, 1)), recording.rotations), axis=1),
+        slides={} if moving else {2: recording.root_positions},
     )
 
 
 @pytest.mark.parametrize("moving", [False, True])
 def test_joints_above_the_hips_are_folded_into_the_root(moving: bool):
     original = swaying()
-    motion, notes = to_motion(hung(recorded(original, unit=0.01, family="Bandai-Namco"), moving))
+    rig = along_x(original, mirrored=True)
+    motion, notes = to_motion(hung(recorded(rig, unit=0.01, family="Bandai-Namco"), moving))
     assert motion.skeleton.names[0] == "Hips"
     assert_same_movement(motion, original)
     assert any("below Armature" in note for note in notes)

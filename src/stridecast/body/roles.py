@@ -60,6 +60,17 @@ FAMILIES: Mapping[str, Limbs] = {
         "forearm": ("LowerArm_{L}", "{Left}LowerArm", "{Left}ForeArm"),
         "hand": ("Hand_{L}", "{Left}Hand"),
     },
+    # the first BVH files there were
+    "classic": {
+        "thigh": ("{Left}UpLeg",),
+        "shin": ("{Left}LowLeg",),
+        "foot": ("{Left}Foot",),
+        "toe": ("{Left}Toe",),
+        "shoulder": ("{Left}Collar",),
+        "upper_arm": ("{Left}UpArm",),
+        "forearm": ("{Left}LowArm",),
+        "hand": ("{Left}Hand",),
+    },
     "SMPL": {
         "thigh": ("{L}_Hip", "{Left}_Hip"),
         "shin": ("{L}_Knee", "{Left}_Knee"),
