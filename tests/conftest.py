@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from beartype import BeartypeConf, beartype
 from hypothesis import HealthCheck, settings
 from jaxtyping import config, install_import_hook
 
@@ -18,9 +17,6 @@ SOURCES = ROOT / "src"
 
 # numba compiles these: a wrapped function is none that it can read
 COMPILED = ("kernels",)
-
-typechecked = beartype(conf=BeartypeConf(is_pep484_tower=True))  # an int will do where a float is asked for
-
 
 def checked_modules() -> list[str]:
     """Every module of the package whose shapes and types are checked while tests run (packages only re-export)."""
@@ -35,7 +31,7 @@ def checked_modules() -> list[str]:
 loaded = sorted(name for name in sys.modules if name.split(".")[0] == "stridecast")
 if loaded:
     raise pytest.UsageError(f"imported before the type checks were in place: {', '.join(loaded)}")
-install_import_hook(checked_modules(), f"{__name__}.typechecked")
+install_import_hook(checked_modules(), "typechecks.typechecked")
 
 from bodies import humanoid  # noqa: E402
 from stridecast.model.skeleton import Skeleton  # noqa: E402

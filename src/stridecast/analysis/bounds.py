@@ -25,7 +25,7 @@ SHARE = 0.9
 SPEED_CELL = 0.25
 """Width of a cell, m/s."""
 
-SLOWEST = 0.4
+SLOWEST = 0.6
 """Slower than this, a turn is no part of walking on, m/s."""
 
 END_SHARE = 0.25

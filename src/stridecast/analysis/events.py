@@ -18,6 +18,12 @@ SHORTEST_STATE = 0.06
 RUNNING_SPEED = 2.1
 """Where a step from foot to foot shows neither double support nor flight, the walker's speed decides which it was, m/s."""
 
+SLOWEST_FLIGHT = 1.6
+"""Nobody flies from step to step slower than this: such a gap between contacts is a double support missed, m/s ..."""
+
+SHORTEST_FLIGHT = 0.045
+"""... and up to running speed, so is a gap shorter than this, seconds."""
+
 LONGEST_BRUSH = 0.1
 """Both feet on the floor for less than this while running is a step with no air under it, as in sharp turns, seconds."""
 
@@ -83,12 +89,14 @@ def support_phases(support: str, speeds: Float[np.ndarray, "frames"], rate: floa
             break
         i = min(bad)[1]
         letters[phases[i].start : phases[i].stop] = _replacement(phases, i)
-    for before, after in zip(phases[:-1], phases[1:], strict=True):
-        running = speeds[after.start] > RUNNING_SPEED
-        if {before.state, after.state} == {"L", "R"}:
-            letters[after.start] = "F" if running else "D"
-        elif after.state == "D" and running and after.stop - after.start < LONGEST_BRUSH * rate:
-            letters[after.start : after.stop] = "F"
+    for i, here in enumerate(phases):
+        running = speeds[here.start] > RUNNING_SPEED
+        if i and {phases[i - 1].state, here.state} == {"L", "R"}:
+            letters[here.start] = "F" if running else "D"
+        elif here.state == "F" and _is_missed_double(here, float(speeds[here.start]), rate, len(letters)):
+            letters[here.start : here.stop] = "D"
+        elif here.state == "D" and running and here.stop - here.start < LONGEST_BRUSH * rate:
+            letters[here.start : here.stop] = "F"
     return [Phase(str(v), a, b) for v, a, b in signals.runs(letters)]
 
 
@@ -104,6 +112,13 @@ def _is_noise(phases: list[Phase], i: int, rate: float) -> bool:
     if here.state in "DF" and after.state in "DF":
         return True
     return here.state in "DF" and before.state in "DF"
+
+
+def _is_missed_double(flight: Phase, speed: float, rate: float, frames: int) -> bool:
+    """Whether a gap between contacts is none; one cut by the end of the take is not believed below running speed."""
+    seen = flight.start > 0 and flight.stop < frames
+    short = flight.stop - flight.start < SHORTEST_FLIGHT * rate
+    return speed < SLOWEST_FLIGHT or (speed < RUNNING_SPEED and (short or not seen))
 
 
 def _replacement(phases: list[Phase], i: int) -> str:
@@ -226,7 +241,8 @@ def label_motions(segments: Sequence[Segment], accelerations: Sequence[float]) -
     """Coarse motion of each segment, seen in its context.
 
     A few walking half cycles on the way from standing to running, or from running to standing, are part of that
-    transition, and so are those next to running in which the walker speeds up or brakes harder than walking does.
+    transition; between running and running they are part of the run (a foot brushed the floor in a sharp turn). So are those
+    next to running in which the walker speeds up or brakes harder than walking does.
 
     Parameters
     ----------
@@ -240,6 +256,7 @@ def label_motions(segments: Sequence[Segment], accelerations: Sequence[float]) -
     for first, last, whole in (
         (f"{STAND}-{WALK}", f"{WALK}-{RUN}", f"{STAND}-{RUN}"),
         (f"{RUN}-{WALK}", f"{WALK}-{STAND}", f"{RUN}-{STAND}"),
+        (f"{RUN}-{WALK}", f"{WALK}-{RUN}", RUN),
     ):
         for i, label in enumerate(labels):
             if label != first:

@@ -26,7 +26,7 @@ Array = np.ndarray
 SIDEWAYS = np.radians(50)
 """Who walks with the pelvis turned further from the way walks sideways or backwards."""
 
-SLOWEST_STEP = 0.3
+SLOWEST_STEP = 0.5
 """A half cycle slower than this on average is shuffling on the spot, m/s."""
 
 LONGEST_STAND = 1.0
@@ -141,7 +141,7 @@ def _unusable(analysis: TakeAnalysis, segment: Segment) -> str | None:
         return None
     frames = slice(segment.start.frame, segment.stop.frame + 1)
     speeds = analysis.vehicle.speeds[frames]
-    moving = speeds > SLOWEST_STEP
+    moving = speeds > 0.5 * SLOWEST_STEP
     turned = float(np.mean(ground.wrap(analysis.details.yaws[frames][moving]))) if moving.any() else 0.0
     if abs(turned) > SIDEWAYS:
         return "backwards" if abs(turned) > np.pi - SIDEWAYS else "sideways"
