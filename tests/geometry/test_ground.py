@@ -77,6 +77,6 @@ def test_positive_headings_turn_left(angle):
 @example(-np.pi)
 def test_wrap_keeps_the_direction_and_stays_in_one_turn(angle):
     wrapped = ground.wrap(np.array(angle))
-    assert -np.pi <= wrapped < np.pi
+    assert -np.pi <= wrapped <= np.pi
     turns = (angle - wrapped) / (2 * np.pi)
     assert abs(turns - round(turns)) < 1e-9

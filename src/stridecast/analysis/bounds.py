@@ -69,12 +69,24 @@ def learn_cyclic(segments: Sequence[SteeringSamples], method: str = "balanced") 
 
 
 def learn_transition(
-    segments: Sequence[SteeringSamples], before: SteeringBounds | None, after: SteeringBounds | None
+    segments: Sequence[SteeringSamples],
+    before: SteeringBounds | None,
+    after: SteeringBounds | None,
+    jerk: float = 0.0,
 ) -> SteeringBounds:
-    """Bounds of a transition: those at its two ends, each widened to the motion it joins.
+    """Bounds of a transition: those at its two ends, each widened to the motion it joins there.
 
     A transition has a few examples at most, so at each end everything they did counts, and so does what the motion it comes
     from (or leads to) allows there: a walker who may begin it must be able to.
+
+    Parameters
+    ----------
+    segments
+        What its examples did.
+    before, after
+        Bounds of the motions at its first and last frame, where there are any.
+    jerk
+        It may change its force at least as fast as this, m/s3: as the motions between which it leads.
     """
     if not segments:
         raise InputError("bounds cannot be learned from no segment")
@@ -92,7 +104,7 @@ def learn_transition(
     neighbours = [n for n in (before, after) if n is not None]
     own = [float((np.abs(s.lateral) / np.maximum(s.speeds, SLOWEST)).max()) for s in segments]
     return SteeringBounds(
-        jerk=max([float(s.jerks.max()) for s in segments] + [n.jerk for n in neighbours]),
+        jerk=max([jerk] + [float(s.jerks.max()) for s in segments] + [n.jerk for n in neighbours]),
         tangential=(tangential[0], tangential[1]),
         lateral_per_speed=max([n.lateral_per_speed for n in neighbours] or own),
         speed=(speed[0], speed[1]),

@@ -18,10 +18,10 @@ SHORTEST_STATE = 0.06
 RUNNING_SPEED = 2.1
 """Where a step from foot to foot shows neither double support nor flight, the walker's speed decides which it was, m/s."""
 
-SLOWEST_FLIGHT = 1.6
+SLOWEST_FLIGHT = 1.7
 """Nobody flies from step to step slower than this: such a gap between contacts is a double support missed, m/s ..."""
 
-SHORTEST_FLIGHT = 0.045
+SHORTEST_FLIGHT = 0.06
 """... and up to running speed, so is a gap shorter than this, seconds."""
 
 LONGEST_BRUSH = 0.1
@@ -241,7 +241,8 @@ def label_motions(segments: Sequence[Segment], accelerations: Sequence[float]) -
     """Coarse motion of each segment, seen in its context.
 
     A few walking half cycles on the way from standing to running, or from running to standing, are part of that
-    transition; between running and running they are part of the run (a foot brushed the floor in a sharp turn). So are those
+    transition; between running and running they are part of the run (a foot brushed the floor in a sharp turn), as one
+    flight between walking and walking is part of the walk (a heel strike was missed). So are those
     next to running in which the walker speeds up or brakes harder than walking does.
 
     Parameters
@@ -253,18 +254,19 @@ def label_motions(segments: Sequence[Segment], accelerations: Sequence[float]) -
     """
     labels = [s.motion for s in segments]
     follows = [False] + [a.stop == b.start for a, b in zip(segments[:-1], segments[1:], strict=True)]
-    for first, last, whole in (
-        (f"{STAND}-{WALK}", f"{WALK}-{RUN}", f"{STAND}-{RUN}"),
-        (f"{RUN}-{WALK}", f"{WALK}-{STAND}", f"{RUN}-{STAND}"),
-        (f"{RUN}-{WALK}", f"{WALK}-{RUN}", RUN),
+    for first, through, last, whole, most in (
+        (f"{STAND}-{WALK}", WALK, f"{WALK}-{RUN}", f"{STAND}-{RUN}", MAX_WALKED_THROUGH),
+        (f"{RUN}-{WALK}", WALK, f"{WALK}-{STAND}", f"{RUN}-{STAND}", MAX_WALKED_THROUGH),
+        (f"{RUN}-{WALK}", WALK, f"{WALK}-{RUN}", RUN, MAX_WALKED_THROUGH),
+        (f"{WALK}-{RUN}", RUN, f"{RUN}-{WALK}", WALK, 1),
     ):
         for i, label in enumerate(labels):
             if label != first:
                 continue
             j = i + 1
-            while j < len(segments) and labels[j] == WALK and follows[j]:
+            while j < len(segments) and labels[j] == through and follows[j]:
                 j += 1
-            if j < len(segments) and labels[j] == last and follows[j] and j - i - 1 <= MAX_WALKED_THROUGH:
+            if j < len(segments) and labels[j] == last and follows[j] and j - i - 1 <= most:
                 labels[i : j + 1] = [whole] * (j + 1 - i)
     hard = [label == WALK and abs(a) > HARD for label, a in zip(labels, accelerations, strict=True)]
     for i in reversed(range(len(labels) - 1)):

@@ -208,7 +208,8 @@ def _learn_bounds(
             continue
         segment = by_group[name][0][1]
         before, after = (cyclic.get(_motion_at(kind)) for kind in (segment.start.kind, segment.stop.kind))
-        out[name] = learn_transition(own, before, after)
+        jerk = max((cyclic[end].jerk for end in motion.split("-") if end in cyclic), default=0.0)
+        out[name] = learn_transition(own, before, after, jerk)
     return out
 
 

@@ -22,7 +22,7 @@ def lift(points: Float[Array, "*shape 2"], height: Float[Array, "*#shape"] | flo
 
 def heading(direction: Float[Array, "*shape 2"]) -> Float[Array, "*shape"]:
     """Heading of a direction on the ground, radians; it has a value at (0, -1), where KS07 eq. 1 has none."""
-    return np.arctan2(direction[..., 0], direction[..., 1])
+    return np.asarray(np.arctan2(direction[..., 0], direction[..., 1]))
 
 
 def direction(heading: Float[Array, "*shape"]) -> Float[Array, "*shape 2"]:
@@ -44,4 +44,4 @@ def turn(points: Float[Array, "*#shape 2"], heading: Float[Array, "*#shape"]) ->
 
 def wrap(angle: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
     """Angles brought into [-pi, pi)."""
-    return (angle + np.pi) % (2 * np.pi) - np.pi
+    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)

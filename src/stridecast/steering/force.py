@@ -25,7 +25,7 @@ class SteeringGains:
         Values that are not positive and finite.
     """
 
-    half_life: float = 0.22
+    half_life: float = 0.3
     damping_ratio: float = 1.0
 
     def __post_init__(self) -> None:

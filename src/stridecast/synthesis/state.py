@@ -26,7 +26,7 @@ class State(NamedTuple):
     side: Array  # C, to which side a reversal is under way
     # wish
     seen: Array  # C 2, the point of the last frame
-    seen_speed: Array  # C, how fast it moves, smoothed
+    seen_velocity: Array  # C 2, how it moves, smoothed
     anchor: Array  # C 2, where the point was when the character came to stand
     # segment
     group: Array  # C
@@ -72,7 +72,7 @@ def make_state(count: int, tables: Tables) -> State:
         "heading": (),
         "side": (),
         "seen": (2,),
-        "seen_speed": (),
+        "seen_velocity": (2,),
         "anchor": (2,),
         "weights": (NEIGHBOURS,),
         "generic": (),

@@ -17,8 +17,14 @@ from stridecast.synthesis.tables import Tables
 
 STAND, WALK, RUN = 0, 1, 2
 
+SEEN_HALF_LIFE = 0.07
+"""How the point moves is smoothed with this half-life, seconds."""
+
 SETTLED = 0.15
 """A point slower than this is at rest, m/s."""
+
+EASE = 0.7
+"""Share of the bounds that making up for a distance counts on."""
 
 MOVED = 0.12
 """A character who stands goes on once the point has moved so far, metres."""
@@ -66,15 +72,22 @@ def step_block(
 
 @kernel
 def watch_point(state: State, points: np.ndarray, by_force: np.ndarray, c: int, dt: float) -> None:
-    """How fast the point moves, smoothed over a tenth of a second."""
+    """How the point moves, smoothed over a tenth of a second."""
     if by_force[c]:
         return
     if state.fresh[c]:
         state.anchor[c, 0], state.anchor[c, 1] = state.position[c, 0], state.position[c, 1]
     else:
-        speed = math.hypot(points[c, 0] - state.seen[c, 0], points[c, 1] - state.seen[c, 1]) / dt
-        state.seen_speed[c] += (speed - state.seen_speed[c]) * (1.0 - 0.5 ** (dt / 0.07))
+        for k in range(2):
+            rate = (points[c, k] - state.seen[c, k]) / dt
+            state.seen_velocity[c, k] += (rate - state.seen_velocity[c, k]) * (1.0 - 0.5 ** (dt / SEEN_HALF_LIFE))
     state.seen[c, 0], state.seen[c, 1] = points[c, 0], points[c, 1]
+
+
+@kernel
+def seen_speed(state: State, c: int) -> float:
+    """How fast the point moves, m/s."""
+    return math.hypot(state.seen_velocity[c, 0], state.seen_velocity[c, 1])
 
 
 @kernel
@@ -100,13 +113,13 @@ def motion_wanted(
     wish = alpha / beta * away
     if standing or state.fresh[c]:
         moved = math.hypot(points[c, 0] - state.anchor[c, 0], points[c, 1] - state.anchor[c, 1])
-        if (moved > MOVED and wish > WISH_TO_GO and state.seen_speed[c] > SETTLED) or away > LEFT_BEHIND:
+        if (moved > MOVED and wish > WISH_TO_GO and seen_speed(state, c) > SETTLED) or away > LEFT_BEHIND:
             return motion
         return STAND
-    if state.seen_speed[c] < SETTLED and wish < WISH_TO_STOP:
+    if seen_speed(state, c) < SETTLED and wish < WISH_TO_STOP:
         state.anchor[c, 0], state.anchor[c, 1] = points[c, 0], points[c, 1]
         return STAND
-    if wish < 0.5 * WISH_TO_GO and state.seen_speed[c] < WISH_TO_GO:
+    if wish < 0.5 * WISH_TO_GO and seen_speed(state, c) < WISH_TO_GO:
         state.anchor[c, 0], state.anchor[c, 1] = points[c, 0], points[c, 1]
         return STAND
     return motion
@@ -129,6 +142,27 @@ def next_segment_if_due(tables: Tables, state: State, c: int, request: int, dt: 
         begin_segment(tables, state, c, request, 0.0)
         return True
     return False
+
+
+@kernel
+def eased(state: State, c: int, x: float, z: float, k: float, brake: float, jerk: float) -> float:
+    """By how much the spring's wished velocity ``(x, z)`` is scaled so that the vehicle can meet the point in time.
+
+    KS07's spring asks for a speed in proportion to the distance, also when the bounds forbid to lose that speed again before
+    the point is reached; the vehicle would swing to and fro. The distance that is more (or less) than an evenly moving
+    point keeps ahead may be made up only as fast as the bounds can take the difference in speed back.
+    """
+    wish = math.hypot(x, z)
+    if wish < 1e-6:
+        return 1.0
+    own = (state.seen_velocity[c, 0] * x + state.seen_velocity[c, 1] * z) / wish
+    gap = (wish - max(own, 0.0)) / k
+    a, j = EASE * max(brake, 0.1), EASE * jerk
+    lead = 0.5 * a / j
+    most = a * (math.sqrt(lead * lead + 2.0 * abs(gap) / a) - lead)
+    if gap > 0.0:
+        return min(wish, max(own, 0.0) + most) / wish
+    return max(wish, own - most) / wish
 
 
 @kernel
@@ -174,6 +208,8 @@ def move_vehicle(
     else:
         k = alpha / beta
         x, z = k * (points[c, 0] - state.position[c, 0]), k * (points[c, 1] - state.position[c, 1])
+        ease = eased(state, c, x, z, k, 0.5 * (high - low), jerk)
+        x, z = ease * x, ease * z
         along, across = x * sine + z * cosine, x * cosine - z * sine
         at_least, at_most = slowest, fastest
         if request == STAND:
