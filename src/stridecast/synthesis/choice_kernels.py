@@ -12,7 +12,7 @@ from stridecast.model.database import MARGIN
 from stridecast.synthesis.state import NEIGHBOURS, State
 from stridecast.synthesis.tables import Tables
 
-SPEED_SCALE, TANGENTIAL_SCALE, LATERAL_SCALE = 0.1, 1.2, 0.7
+SPEED_SCALE, TANGENTIAL_SCALE, LATERAL_SCALE = 0.1, 1.2, 0.45
 """Differences in speed (m/s) and acceleration (m/s2) that weigh as much as each other ..."""
 
 AHEAD = 0.22

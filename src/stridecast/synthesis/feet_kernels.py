@@ -165,6 +165,7 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
     if state.fresh[c]:
         for k in range(3):
             state.toe[c, side, k] = toe[k]
+            state.toe_meant[c, side, k] = toe[k]
             state.hold[c, side, k] = toe[k]
         for k in range(4):
             state.hold_turn[c, side, k] = turned[k]
@@ -184,12 +185,12 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
         for k in range(4):
             state.hold_turn[c, side, k] = held[k]
     elif not planted and state.locked[c, side]:
-        # Let go: what it was held back by fades.
+        # Let go: what it was held back by in the last frame fades, and so does how much slower it was.
         state.locked[c, side] = False
         for k in range(3):
-            slip, rate = shown[k] - toe[k], state.slip_rate[c, side, k]
-            state.slip[c, side, k] = slip
-            state.slip_rate[c, side, k] = rate
+            state.slip[c, side, k] = shown[k] - state.toe_meant[c, side, k]
+            rate = (toe[k] - state.toe_meant[c, side, k]) / dt
+            state.slip_rate[c, side, k] = state.toe_rate[c, side, k] - rate
 
     if state.locked[c, side]:
         half_life = CATCH_HALF_LIFE
@@ -214,8 +215,10 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
         slip, rate = decay(state.slip[c, side, k], state.slip_rate[c, side, k], half_life, dt)
         state.slip[c, side, k], state.slip_rate[c, side, k] = slip, rate
         state.toe[c, side, k] = meant[k] + slip
-    if state.toe[c, side, 1] < tables.sole:
-        state.toe[c, side, 1] = tables.sole
+    state.toe[c, side, 1] = max(state.toe[c, side, 1], tables.sole)
+    for k in range(3):
+        state.toe_rate[c, side, k] = 0.0 if state.fresh[c] else (state.toe[c, side, k] - shown[k]) / dt
+        state.toe_meant[c, side, k] = toe[k]
 
 
 @kernel

@@ -47,6 +47,8 @@ class State(NamedTuple):
     hold: Array  # C 2 3, place of the toe held
     hold_turn: Array  # C 2 4, rotation of the foot held
     toe: Array  # C 2 3, of the last frame as shown
+    toe_rate: Array  # C 2 3, how fast it moved
+    toe_meant: Array  # C 2 3, of the last frame in the blended pose
     slip: Array  # C 2 3, toe shown minus toe meant
     slip_rate: Array  # C 2 3
     twist: Array  # C 2, turn of the foot about the vertical against the blended pose
@@ -84,6 +86,8 @@ def make_state(count: int, tables: Tables) -> State:
         "hold": (2, 3),
         "hold_turn": (2, 4),
         "toe": (2, 3),
+        "toe_rate": (2, 3),
+        "toe_meant": (2, 3),
         "slip": (2, 3),
         "slip_rate": (2, 3),
         "twist": (2,),

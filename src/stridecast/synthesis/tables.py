@@ -29,7 +29,7 @@ class Tables(NamedTuple):
     # examples
     features: Array  # E R D
     times: Array  # E R
-    parameters: Array  # E 3
+    parameters: Array  # E 3, speed at the first frame, mean tangential and lateral acceleration
     durations: Array  # E
     allowed: Array  # E, of the chosen subjects
     # groups
@@ -83,7 +83,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
     return Tables(
         features=examples.features,
         times=examples.times,
-        parameters=examples.parameters,
+        parameters=_parameters(database),
         durations=examples.durations,
         allowed=allowed,
         first=np.array([g.first for g in groups]),
@@ -121,6 +121,20 @@ def _allowed(database: MotionDatabase, subject: str | None) -> Bool[Array, "exam
         raise DatabaseError(f"there is no subject {subject!r} in the database; there are {', '.join(database.subjects)}")
     of_take = np.array([take.subject == subject for take in database.takes])
     return of_take[database.examples.takes]
+
+
+def _parameters(database: MotionDatabase) -> Array:
+    """What examples are chosen by: speed at the first frame, and both accelerations as means over the whole segment.
+
+    KS07 takes the accelerations at the first frame too; but a half cycle in which a turn begins starts like a straight one, and
+    straight walking would be blended with it.
+    """
+    examples = database.examples
+    first, last = examples.travelled[:, MARGIN], examples.travelled[:, -1 - MARGIN]
+    gained, turned = last[:, 3] - first[:, 3], last[:, 2] - first[:, 2]
+    speed = examples.parameters[:, 0]
+    lateral = turned * 0.5 * (last[:, 3] + first[:, 3]) / examples.durations
+    return np.stack((speed, gained / examples.durations, lateral), axis=-1)
 
 
 def _range(values: Array) -> tuple[float, float]:
