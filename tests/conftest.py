@@ -34,6 +34,7 @@ if loaded:
 install_import_hook(checked_modules(), "typechecks.typechecked")
 
 from bodies import humanoid  # noqa: E402
+from stridecast.model.database import MotionDatabase  # noqa: E402
 from stridecast.model.skeleton import Skeleton  # noqa: E402
 
 settings.register_profile(
@@ -79,3 +80,37 @@ def unchecked() -> Iterator[None]:
 def skeleton() -> Skeleton:
     """The humanoid of ``bodies``: 24 joints, left and right alike, all roles."""
     return humanoid()
+
+
+@pytest.fixture(scope="session")
+def formula_takes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with BVH takes of a person made of formulas: standing, walking, running, and what lies between."""
+    from stridecast.formats.bvh import write_bvh
+    from synthetic_gait import gait, ramps
+
+    folder = tmp_path_factory.mktemp("formulas")
+    takes = {
+        "01_01": (ramps((0.8, 0.0), (2.4, 1.3), (0.8, 0.0)), 0.0),
+        "01_02": (ramps((1.5, 1.0), (1.5, 1.5)), 0.5),
+        "02_01": (ramps((1.5, 3.0)), 0.1),
+    }
+    for name, (speeds, curvature) in takes.items():
+        write_bvh(folder / f"{name}.bvh", gait(speeds, curvature=curvature).motion)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def formula_database(formula_takes: Path) -> MotionDatabase:
+    """What is learned from ``formula_takes``."""
+    from stridecast.building.build import build
+
+    return build(formula_takes, jobs=1, cache=False)
+
+
+@pytest.fixture(scope="session")
+def small_database(mocap: Path) -> MotionDatabase:
+    """What is learned from six recordings: walking, a start, a stop, and running from and to standing."""
+    from stridecast.building.build import build
+
+    takes = ("16/16_15", "16/16_31", "16/16_33", "16/16_55", "16/16_08", "127/127_04")
+    return build([mocap / "cmu" / f"{take}.amc" for take in takes], jobs=1, cache=False)

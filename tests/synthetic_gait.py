@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -52,7 +53,7 @@ def smooth(u):
 def ramps(*pieces: tuple[float, float], rate: float = 60.0, change: float = 0.9) -> np.ndarray:
     """Speeds frame by frame: each piece is seconds and the speed held in them, with a smooth change before the next."""
     out = [np.full(round(pieces[0][0] * rate), pieces[0][1])]
-    for (_, before), (seconds, after) in zip(pieces[:-1], pieces[1:], strict=True):
+    for (_, before), (seconds, after) in pairwise(pieces):
         u = np.arange(1, round(change * rate)) / (change * rate)
         out += [before + (after - before) * smooth(u), np.full(round(seconds * rate), after)]
     return np.concatenate(out)
@@ -102,7 +103,14 @@ def gait(
     phases = _phases(speeds, rate, phase)
     run, go = running_share(speeds), smooth(speeds / 0.5)
 
-    height = HIP_HEIGHT * size - 0.03 - 0.025 * np.minimum(speeds, 1.9) - 0.02 * run - 0.16 * run * (1 - run) + go * (0.018 * (1 - run) - 0.03 * run) * np.cos(2 * phases)
+    height = (
+        HIP_HEIGHT * size
+        - 0.03
+        - 0.025 * np.minimum(speeds, 1.9)
+        - 0.02 * run
+        - 0.16 * run * (1 - run)
+        + go * (0.018 * (1 - run) - 0.03 * run) * np.cos(2 * phases)
+    )
     body = np.stack((go * sway * np.cos(phases), height, go * surge * np.sin(2 * phases)), axis=-1)
     root = ground.lift(positions) + quat.rotate(quat.about_y(headings), body)
     rotations = np.tile(quat.IDENTITY, (frames, skeleton.joints, 1))
@@ -161,7 +169,7 @@ def _phases(speeds, rate, first):
     if len(edges) == 0:
         return out + (np.pi / 2 if not moving[0] else first)
     # each stretch of moving between two of standing takes a whole number of steps; open ends are anchored at standing
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+    for start, stop in pairwise(edges):
         if moving[start]:
             taken = out[stop] - out[start - 1]
             stretch = np.pi * round(taken / np.pi) / taken
@@ -236,5 +244,5 @@ def _beyond(positions, headings, speeds, at):
         step = np.diff(table[end], axis=0)[0] * np.clip(at - inside, -200, 200)
         chord = np.linalg.norm(step[:2]) * np.sign(at - inside)
         bend = value[2] + step[2] / 2
-        value = value + [chord * np.sin(bend), chord * np.cos(bend), step[2]]
+        value = value + np.array([chord * np.sin(bend), chord * np.cos(bend), step[2]])
     return value

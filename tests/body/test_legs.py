@@ -36,7 +36,7 @@ def goals(motion, side: str, seed: int, share=(0.55, 0.99)) -> np.ndarray:
     """Places within reach: a part of the leg's length from the hip, roughly down."""
     rng = np.random.default_rng(seed)
     hip = kinematics.pose(motion).positions[:, motion.skeleton.joint(f"{side}_thigh")]
-    way = rng.normal(0.0, 0.5, hip.shape) + [0.0, -1.0, 0.0]
+    way = rng.normal(0.0, 0.5, hip.shape) + np.array([0.0, -1.0, 0.0])
     way /= np.linalg.norm(way, axis=-1, keepdims=True)
     return hip + way * motion.skeleton.leg_length * rng.uniform(*share, (len(hip), 1))
 

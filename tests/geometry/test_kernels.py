@@ -21,9 +21,7 @@ def unit(numbers: tuple[float, ...]) -> tuple[float, ...]:
 
 
 ROTATIONS = (
-    st.tuples(*[st.floats(-1.0, 1.0, allow_subnormal=False)] * 4)
-    .filter(lambda q: np.linalg.norm(q) > 1e-3)
-    .map(unit)
+    st.tuples(*[st.floats(-1.0, 1.0, allow_subnormal=False)] * 4).filter(lambda q: np.linalg.norm(q) > 1e-3).map(unit)
 )
 DIRECTIONS = VECTORS.filter(lambda v: np.linalg.norm(v) > 1e-2)
 

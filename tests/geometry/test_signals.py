@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -24,7 +26,7 @@ def two_flags(draw_length=60):
 def test_runs_tell_the_whole_signal_in_order(letters):
     found = signals.runs(np.array(letters))
     assert [value for value, start, stop in found for _ in range(start, stop)] == letters
-    assert all(a.stop == b.start and a.value != b.value for a, b in zip(found[:-1], found[1:], strict=True))
+    assert all(a.stop == b.start and a.value != b.value for a, b in pairwise(found))
 
 
 # switches

@@ -184,7 +184,7 @@ def _moving_share(standing: Bool[Array, "frames"], rate: float) -> Float[Array, 
 def _detail_basis(phase: Float[Array, "frames"]) -> Float[Array, "frames 2 terms"]:
     """Sway (left) in odd harmonics of the stride, surge (forward) in even ones: a step is half a stride, mirrored."""
     sway = [f(n * phase) for n in (1, 3) for f in (np.cos, np.sin)]
-    surge = [f(n * phase) for n in (2, 4) for f in (np.cos, np.sin)]
+    surge = [wave for n in (2, 4) for wave in (np.cos(n * phase) - 1.0, np.sin(n * phase))]  # none at mid-stance
     out = np.zeros((len(phase), 2, 8))
     out[:, 0, :4] = np.stack(sway, axis=-1)
     out[:, 1, 4:] = np.stack(surge, axis=-1)

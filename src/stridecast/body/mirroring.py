@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from stridecast.body import kinematics
+from stridecast.body.legs import reach
 from stridecast.geometry import quaternions as quat
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import ARMS, LEGS, Skeleton
@@ -56,6 +57,28 @@ def mirror(motion: Motion) -> Motion:
         rotations=kinematics.local(skeleton, turned),
         name=f"{motion.name} mirrored".strip(),
     )
+
+
+def mirror_planted(motion: Motion) -> Motion:
+    """Mirror a motion as ``mirror`` does, then bend the legs so that each toe is where its partner's mirror image is.
+
+    Legs of a real skeleton differ by a few millimetres, and so far a foot that stood still would slide once mirrored.
+
+    Raises
+    ------
+    SkeletonError
+        A joint of the legs is missing.
+    """
+    skeleton = motion.skeleton
+    mirrored = mirror(motion)
+    before, after = kinematics.pose(motion), kinematics.pose(mirrored)
+    rotations = mirrored.rotations
+    for side, other in (("left", "right"), ("right", "left")):
+        foot, toe = skeleton.chain(f"{side}_foot", f"{side}_toe")
+        toes = before.positions[:, skeleton.joint(f"{other}_toe")] * _VECTOR
+        ankles = toes - quat.rotate(after.rotations[:, foot], skeleton.offsets[toe])
+        rotations = reach(skeleton, mirrored.root_positions, rotations, side, ankles)
+    return replace(mirrored, rotations=quat.continuous(quat.normalize(rotations)))
 
 
 def mirror_pairs(skeleton: Skeleton) -> Int[np.ndarray, "joints"]:

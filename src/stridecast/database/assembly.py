@@ -229,7 +229,7 @@ def _example(
     # Generic time to frames: keys onto keys, evenly between, and straight on beyond both ends.
     frames = warp(keys, np.array([k - start for k in segment.keys], float), float(length)) + start
     low, high = max(0, int(frames.min()) - 2), min(motion.frames, int(frames.max()) + 4)
-    inside = np.arange(low, high)
+    inside = np.arange(low, high, dtype=float)
 
     tangents = quat.log(quat.multiply(quat.inverse(references), motion.rotations[low:high, 1:]))
     series = np.concatenate(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -88,6 +89,27 @@ def read_text(path: str | Path) -> bytes:
     return data
 
 
+def check_place(path: str | Path) -> None:
+    """Raise the error that ``replacing`` would raise, before the work whose result is to be written.
+
+    Raises
+    ------
+    FileError
+        There is no such folder, no right to write in it, or a folder of that name.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise FileError("cannot be written: it is a folder; name a file in it", path=path)
+    if not path.parent.is_dir():
+        raise FileError("cannot be written: there is no such folder", path=path)
+    temporary = _beside(path)
+    try:
+        temporary.touch(exist_ok=False)
+        temporary.unlink()
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror or error}", path=path) from error
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[BinaryIO]:
     """Open a new file beside ``path`` for writing; it takes that name only once it is whole.
@@ -98,13 +120,20 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
         The file system refuses (no such folder, no right, disk full). What was at ``path`` is untouched.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{token_hex(4)}.part")
+    temporary = _beside(path)
     try:
         try:
             with temporary.open("xb") as file:
                 yield file
+                file.flush()
+                os.fsync(file.fileno())
             temporary.replace(path)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
         raise FileError(f"cannot be written: {error.strerror or error}", path=path) from error
+
+
+def _beside(path: Path) -> Path:
+    """Name of an unfinished file."""
+    return path.with_name(f".{path.name}.{token_hex(4)}.part")

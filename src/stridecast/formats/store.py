@@ -59,9 +59,7 @@ def save_database(database: MotionDatabase, path: str | Path) -> None:
         "takes": [asdict(take) for take in database.takes],
     }
     tensors["references"] = database.references
-    tensors |= {
-        f"examples.{name}": getattr(database.examples, name).astype(kind) for name, kind in _TABLES.items()
-    }
+    tensors |= {f"examples.{name}": getattr(database.examples, name).astype(kind) for name, kind in _TABLES.items()}
     write_tensors(path, header, tensors)
 
 
@@ -89,9 +87,9 @@ def load_database(path: str | Path) -> MotionDatabase:
 
 
 def as_stored(database: MotionDatabase) -> MotionDatabase:
-    """The database as it comes back from a file: the same numbers, rounded as they are stored."""
-    examples = database.examples
-    rounded = {name: getattr(examples, name).astype(kind).astype(getattr(examples, name).dtype) for name, kind in _TABLES.items()}
+    """Round a database's numbers as a file does: what comes back is what ``load_database`` would give."""
+    tables = {name: getattr(database.examples, name) for name in _TABLES}
+    rounded = {name: table.astype(_TABLES[name]).astype(table.dtype) for name, table in tables.items()}
     return replace(database, examples=Examples(**rounded))
 
 
@@ -110,7 +108,7 @@ def _unpack(header: Mapping[str, Any], tensors: Tensors) -> MotionDatabase:
 
 
 def _table(tensors: Tensors, name: str) -> np.ndarray:
-    """A table in the kind of number that code works with."""
+    """Find a table, in the kind of number that code works with."""
     table = tensors[f"examples.{name}"]
     return table.astype(np.float64) if table.dtype.kind == "f" else table
 
@@ -124,7 +122,7 @@ def _group(row: Mapping[str, Any]) -> MotionGroup:
 
 
 def _check(database: MotionDatabase) -> None:
-    """What the types let through, and a walker would stumble over."""
+    """Refuse what the types let through and a walker would stumble over."""
     database.skeleton.require_roles()
     examples = database.examples
     first = 0

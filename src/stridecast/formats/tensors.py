@@ -72,7 +72,7 @@ def read_tensors(path: str | Path, kind: str, version: int) -> tuple[dict[str, A
 
 
 def _is_cut(start: bytes) -> bool:
-    """Whether a file that cannot be read began as a safetensors file: a length, then JSON."""
+    """Tell whether a file that cannot be read begins as a safetensors file: a length, then JSON."""
     return start[8:9] == b"{" and int.from_bytes(start[:8], "little") < 1 << 30
 
 
@@ -93,13 +93,13 @@ def _header(path: str | Path, kind: str, version: int, text: str) -> dict[str, A
 
 
 def pack_skeleton(skeleton: Skeleton) -> tuple[dict[str, Any], Tensors]:
-    """Header and arrays of a skeleton; ``unpack_skeleton`` makes the same one of them."""
+    """Take a skeleton apart into a header and arrays; ``unpack_skeleton`` makes the same one of them."""
     header = {"names": list(skeleton.names), "roles": dict(skeleton.roles)}
     return header, {f"skeleton.{name}": getattr(skeleton, name) for name in _SKELETON}
 
 
 def unpack_skeleton(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> Skeleton:
-    """Skeleton from its header and arrays; errors of ``Skeleton``, and a ``KeyError`` where something is missing."""
+    """Make a skeleton of its header and arrays; errors of ``Skeleton``, a ``KeyError`` where something is missing."""
     arrays = {name: tensors[f"skeleton.{name}"] for name in _SKELETON}
     return Skeleton(names=tuple(header["names"]), roles=dict(header["roles"]), **arrays)
 

@@ -25,7 +25,7 @@ class VehicleState:
     position: Float[Array, "*characters 2"]
     velocity: Float[Array, "*characters 2"]
     acceleration: Float[Array, "*characters 2"]
-    heading: Float[Array, "*characters"]
+    heading: Float[Array, "*characters"] | float
 
 
 @dataclass(frozen=True, kw_only=True, slots=True, eq=False)
@@ -44,9 +44,9 @@ class BoundsInForce:
         Least and greatest speed, m/s.
     """
 
-    jerk: Float[Array, "*characters"]
+    jerk: Float[Array, "*characters"] | float
     tangential: Float[Array, "*characters 2"]
-    lateral: Float[Array, "*characters"]
+    lateral: Float[Array, "*characters"] | float
     speed: Float[Array, "*characters 2"]
 
 

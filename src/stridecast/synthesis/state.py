@@ -27,7 +27,8 @@ class State(NamedTuple):
     # wish
     seen: Array  # C 2, the point of the last frame
     seen_velocity: Array  # C 2, how it moves, smoothed
-    anchor: Array  # C 2, where the point was when the character came to stand
+    anchor: Array  # C 2, where the point rested when the character decided to stop beside it
+    arriving: Array  # C, whether it has decided so
     # segment
     group: Array  # C
     chosen: Array  # C NEIGHBOURS, examples
@@ -99,7 +100,7 @@ def make_state(count: int, tables: Tables) -> State:
         "bounds": (6,),
     }
     whole = {"group": (), "chosen": (NEIGHBOURS,), "segments": (), "made_up": (), "acted": ()}
-    flags = {"locked": (2,), "given_up": (2,), "fresh": ()}
+    flags = {"arriving": (), "locked": (2,), "given_up": (2,), "fresh": ()}
     arrays = {name: np.zeros((count, *shape)) for name, shape in shapes.items()}
     arrays |= {name: np.zeros((count, *shape), np.int64) for name, shape in whole.items()}
     arrays |= {name: np.zeros((count, *shape), bool) for name, shape in flags.items()}

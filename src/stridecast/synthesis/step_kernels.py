@@ -29,8 +29,11 @@ EASE = 0.7
 MOVED = 0.12
 """A character who stands goes on once the point has moved so far, metres."""
 
-LEFT_BEHIND = 0.9
+LEFT_BEHIND = 2.0
 """... or is so far away, metres."""
+
+REACTION = 0.2
+"""Time until a stop begins, on average, seconds."""
 
 WISH_TO_GO = 0.3
 """Slower than this nobody starts to walk, m/s; as a force: m/s2."""
@@ -102,27 +105,36 @@ def motion_wanted(
     beta: float,
     c: int,
 ) -> int:
-    """The motion asked for; standing, once the point has been reached and rests, or while there is nowhere to go."""
-    if motion == STAND:
+    """The motion asked for; standing at first, once the point has been reached and rests, or while there is nowhere to go."""
+    if motion == STAND or state.fresh[c]:
         return STAND
-    standing = tables.leads_to[state.group[c]] == STAND and not state.fresh[c]
+    standing = tables.leads_to[state.group[c]] == STAND
     if by_force[c]:
         force = math.hypot(forces[c, 0], forces[c, 1])
         return STAND if standing and force < WISH_TO_GO else motion
     away = math.hypot(points[c, 0] - state.position[c, 0], points[c, 1] - state.position[c, 1])
-    wish = alpha / beta * away
-    if standing or state.fresh[c]:
+    wish, moving = alpha / beta * away, seen_speed(state, c)
+    if standing or state.arriving[c]:
+        # Stay with the decision until the point goes on, or turns out to be far away.
         moved = math.hypot(points[c, 0] - state.anchor[c, 0], points[c, 1] - state.anchor[c, 1])
-        if (moved > MOVED and wish > WISH_TO_GO and seen_speed(state, c) > SETTLED) or away > LEFT_BEHIND:
+        if (moved > MOVED and wish > WISH_TO_GO and moving > SETTLED) or (standing and away > LEFT_BEHIND):
+            state.arriving[c] = False
             return motion
         return STAND
-    if seen_speed(state, c) < SETTLED and wish < WISH_TO_STOP:
+    rests = moving < SETTLED and (wish < WISH_TO_STOP or away < stopping_way(tables, state, c))
+    if rests or (wish < 0.5 * WISH_TO_GO and moving < WISH_TO_GO):
         state.anchor[c, 0], state.anchor[c, 1] = points[c, 0], points[c, 1]
-        return STAND
-    if wish < 0.5 * WISH_TO_GO and seen_speed(state, c) < WISH_TO_GO:
-        state.anchor[c, 0], state.anchor[c, 1] = points[c, 0], points[c, 1]
+        state.arriving[c] = True
         return STAND
     return motion
+
+
+@kernel
+def stopping_way(tables: Tables, state: State, c: int) -> float:
+    """How far the vehicle goes on if it is to stop now: until its next segment, and then braking, metres."""
+    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    brake = max(-tables.tangential[state.group[c], 0, 0], 0.3)
+    return speed * REACTION + 0.5 * speed * speed / brake
 
 
 @kernel

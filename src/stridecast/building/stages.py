@@ -1,0 +1,114 @@
+"""What is done with one take: read it, then understand it and its mirror image. Both run in worker processes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from stridecast.analysis.take import TakeAnalysis, analyse
+from stridecast.body.mirroring import mirror_planted
+from stridecast.errors import FileError, InputError, TakeError
+from stridecast.formats.recordings import load_recording
+from stridecast.model.motion import Motion
+from stridecast.model.skeleton import Skeleton
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How recordings are read: joints by role, metres per unit, frames a second where a file does not say."""
+
+    roles: Mapping[str, str] | None = None
+    scale: float | None = None
+    input_rate: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """A take as it was read; ``motion`` is left out where only the rest is remembered from an earlier build."""
+
+    name: str
+    subject: str
+    frames: int
+    frame_rate: float
+    skeleton: Skeleton
+    notes: tuple[str, ...]
+    motion: Motion | None
+
+    @property
+    def seconds(self) -> float:
+        """Time from the first frame to the last."""
+        return (self.frames - 1) / self.frame_rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadTask:
+    """What ``read`` is to do."""
+
+    path: Path
+    reading: Reading
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AnalysisTask:
+    """What ``understand`` is to do; without ``motion`` the file is read again."""
+
+    path: Path
+    reading: Reading
+    motion: Motion | None
+    skeleton: Skeleton
+    mirror: bool
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Understood:
+    """Analyses of a take and of its mirror image, if that was wanted and possible."""
+
+    analysis: TakeAnalysis
+    mirrored: TakeAnalysis | None
+    notes: tuple[str, ...] = ()
+
+
+def read(task: ReadTask) -> Recording:
+    """Read a recording; errors are those of ``load_recording``, without the path in front."""
+    reading = task.reading
+    says_rate = task.path.suffix.lower() == ".bvh"
+    try:
+        motion, notes = load_recording(
+            task.path,
+            roles=reading.roles,
+            scale=reading.scale,
+            frame_rate=None if says_rate else reading.input_rate,
+        )
+    except InputError as error:
+        raise TakeError(_without_path(error, task.path)) from error
+    return Recording(
+        name=motion.name,
+        subject=motion.subject,
+        frames=motion.frames,
+        frame_rate=motion.frame_rate,
+        skeleton=motion.skeleton,
+        notes=notes,
+        motion=motion,
+    )
+
+
+def understand(task: AnalysisTask) -> Understood:
+    """Analyse a take on the database's skeleton, and its mirror image; errors are those of ``analyse``."""
+    motion = task.motion or read(ReadTask(path=task.path, reading=task.reading)).motion
+    analysis = analyse(motion, task.skeleton)  # type: ignore[arg-type]
+    if not task.mirror:
+        return Understood(analysis=analysis, mirrored=None)
+    try:
+        return Understood(analysis=analysis, mirrored=analyse(mirror_planted(analysis.motion)))
+    except InputError as error:
+        return Understood(analysis=analysis, mirrored=None, notes=(f"its mirror image is left out: {error}",))
+
+
+def _without_path(error: InputError, path: Path) -> str:
+    """Message of an error without the path of the take in front, which is told beside it."""
+    text = str(error)
+    if not text.startswith(f"{path}:"):
+        return text
+    text = text.removeprefix(f"{path}:").strip()
+    return f"line {text}" if isinstance(error, FileError) and error.line is not None else text
