@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 from jaxtyping import config, install_import_hook
+from threadpoolctl import threadpool_limits
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of what is loaded later
+SINGLE_THREADED = threadpool_limits(1)  # the matrices are small: threads would only wait for each other
 
 TESTS = Path(__file__).resolve().parent
 ROOT = TESTS.parent

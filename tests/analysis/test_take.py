@@ -89,7 +89,7 @@ def test_any_motion_is_understood_or_left_out_with_the_reason(seed, frames):
         analysis = analyse(motion)
     except TakeError as error:
         reason = str(error)
-        assert re.search(r"\d s long|steps", reason)  # noqa: PT017
+        assert re.search(r"\d s long|steps", reason)
     else:
         assert np.isfinite(analysis.vehicle.positions).all()
 

@@ -118,7 +118,7 @@ def test_other_files_are_refused(tmp_path, content, says):
 def test_a_cut_file_is_refused(stored, keep):
     data = stored.read_bytes()
     stored.write_bytes(data[: int(len(data) * keep) if isinstance(keep, float) else keep])
-    with pytest.raises(DatabaseFileError, match="cut|not a safetensors"):
+    with pytest.raises(DatabaseFileError, match=r"cut|not a safetensors"):
         load_database(stored)
 
 

@@ -28,6 +28,9 @@ SPEED_CELL = 0.25
 SLOWEST = 0.6
 """Slower than this, a turn is no part of walking on, m/s."""
 
+LEAST_JERK = 1.0
+"""Even a recording of somebody as still as a statue gives a body that can be moved, m/s3."""
+
 END_SHARE = 0.25
 """At each end of a transition, so much of the segment tells the bounds there."""
 
@@ -61,7 +64,7 @@ def learn_cyclic(segments: Sequence[SteeringSamples], method: str = "balanced") 
     turning = np.abs(lateral[moving]) / speeds[moving]
     middle, half = _tangential(speeds, tangential, method)
     return SteeringBounds(
-        jerk=max(float(s.jerks.max()) for s in segments),
+        jerk=max(LEAST_JERK, *(float(s.jerks.max()) for s in segments)),
         tangential=((middle - half, middle + half),) * 2,
         lateral_per_speed=_quantile(turning, _weights(speeds[moving], turning, SPEED_CELL, method)),
         speed=(_range([s.speeds[0] for s in segments]), _range([s.speeds[-1] for s in segments])),
@@ -72,7 +75,9 @@ def learn_transition(
     segments: Sequence[SteeringSamples],
     before: SteeringBounds | None,
     after: SteeringBounds | None,
+    *,
     jerk: float = 0.0,
+    arrives: bool = False,
 ) -> SteeringBounds:
     """Bounds of a transition: those at its two ends, each widened to the motion it joins there.
 
@@ -87,6 +92,8 @@ def learn_transition(
         Bounds of the motions at its first and last frame, where there are any.
     jerk
         It may change its force at least as fast as this, m/s3: as the motions between which it leads.
+    arrives
+        Whether the motion it leads to begins at its last frame; the tangential bounds there are then that motion's.
     """
     if not segments:
         raise InputError("bounds cannot be learned from no segment")
@@ -95,8 +102,11 @@ def learn_transition(
         ends = [_end(s, first) for s in segments]
         low, high = min(float(s.tangential.min()) for s in ends), max(float(s.tangential.max()) for s in ends)
         slow, fast = _range([s.speeds[0 if first else -1] for s in segments])
-        if neighbour is not None:
+        if neighbour is not None and arrives and not first:
+            low, high = neighbour.tangential_hull
+        elif neighbour is not None:
             low, high = min(low, neighbour.tangential_hull[0]), max(high, neighbour.tangential_hull[1])
+        if neighbour is not None:
             side = neighbour.speed[1 if first else 0]
             slow, fast = min(slow, side[0]), max(fast, side[1])
         tangential.append((min(low, 0.0), max(high, 0.0)))

@@ -13,6 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import BSpline
+from scipy.sparse import csc_array, csr_array, diags_array, eye_array
+from scipy.sparse.linalg import splu
 
 from stridecast.errors import TakeError
 from stridecast.geometry import ground, signals
@@ -100,13 +102,13 @@ def fit_vehicle(
 
 @dataclass(frozen=True, kw_only=True)
 class _SplineBasis:
-    """Design matrices of a spline and its derivatives at the frames of a take, and the penalty on its third derivative."""
+    """Sparse design matrices of a spline and its derivatives at the frames of a take, and the penalty on its jerk."""
 
-    position: Float[Array, "frames coefficients"]
-    velocity: Float[Array, "frames coefficients"]
-    acceleration: Float[Array, "frames coefficients"]
-    jerk: Float[Array, "frames coefficients"]
-    penalty: Float[Array, "frames coefficients"]
+    position: csr_array
+    velocity: csr_array
+    acceleration: csr_array
+    jerk: csr_array
+    penalty: csr_array
 
     @classmethod
     def over(cls, frames: int, rate: float, stride: float) -> _SplineBasis:
@@ -114,16 +116,19 @@ class _SplineBasis:
         pieces = max(2, round(end / (0.2 * stride)))
         knots = np.concatenate((np.zeros(DEGREE), np.linspace(0, end, pieces + 1), np.full(DEGREE, end)))
         times = np.arange(frames) / rate
-        whole = BSpline(knots, np.eye(pieces + DEGREE), DEGREE)
-        orders = [whole(times)] + [whole.derivative(order)(times) for order in (1, 2, 3)]
+        orders = [BSpline.design_matrix(times, knots, DEGREE)]
+        differences = eye_array(len(knots) - DEGREE - 1)
+        for order in range(1, 4):
+            # The derivative of a spline is one of a degree less; its coefficients are scaled differences.
+            degree = DEGREE - order + 1
+            span = knots[degree + 1 : -1] - knots[1 : -degree - 1]
+            step = diags_array([-degree / span, degree / span], offsets=[0, 1], shape=(len(span), len(span) + 1))
+            differences = step @ differences
+            knots = knots[1:-1]
+            orders.append(BSpline.design_matrix(times, knots, degree - 1) @ differences)
         weight = (2 * np.pi * CUTOFF / stride) ** -3.0
-        return cls(
-            position=orders[0],
-            velocity=orders[1],
-            acceleration=orders[2],
-            jerk=orders[3],
-            penalty=weight * orders[3],
-        )
+        position, velocity, acceleration, jerk = (csr_array(m) for m in orders)
+        return cls(position=position, velocity=velocity, acceleration=acceleration, jerk=jerk, penalty=weight * jerk)
 
     def values(self, coefficients: Float[Array, "coefficients 2"]) -> list[Float[Array, "frames 2"]]:
         """Place and first three derivatives at every frame."""
@@ -201,23 +206,21 @@ def _fit(
     """Spline coefficients and detail amplitudes that explain the pelvis best, with little jerk and still where one stands."""
     count, terms = basis.position.shape[1], detail.shape[-1]
     turned = ground.turn(np.moveaxis(detail, 1, 2), headings[:, None])
-    smooth = np.concatenate((basis.penalty, STILLNESS * basis.velocity[standing]))
-    none, zero = np.zeros_like(smooth), np.zeros((len(smooth), terms))
-    unmoved = np.zeros_like(basis.position)
-    # The last row is a whisper against large amplitudes: half a stride must not trade sway for steering.
-    system = np.block(
-        [
-            [basis.position, unmoved, turned[..., 0]],
-            [unmoved, basis.position, turned[..., 1]],
-            [smooth, none, zero],
-            [none, smooth, zero],
-            [np.zeros((terms, 2 * count)), np.eye(terms) * 0.05 * np.sqrt(len(pelvis))],
-        ]
+    still = STILLNESS * basis.velocity[np.flatnonzero(standing)]
+    # Normal equations: the spline's part is the same narrow band for x and z, joined by the few detail amplitudes.
+    band = basis.position.T @ basis.position + basis.penalty.T @ basis.penalty + still.T @ still
+    cross = [basis.position.T @ turned[..., axis] for axis in (0, 1)]
+    # A whisper against large amplitudes: half a stride must not trade sway for steering.
+    own = sum(turned[..., axis].T @ turned[..., axis] for axis in (0, 1)) + 0.0025 * len(pelvis) * np.eye(terms)
+    solver = splu(csc_array(band))
+    reduced = [solver.solve(c) for c in cross]
+    free = [solver.solve(basis.position.T @ pelvis[:, axis]) for axis in (0, 1)]
+    amplitudes = np.linalg.solve(
+        own - sum(c.T @ r for c, r in zip(cross, reduced, strict=True)),
+        sum(turned[..., axis].T @ pelvis[:, axis] - cross[axis].T @ free[axis] for axis in (0, 1)),
     )
-    target = np.zeros(len(system))
-    target[: 2 * len(pelvis)] = pelvis.T.ravel()
-    solution = np.linalg.lstsq(system, target, rcond=None)[0]
-    return solution[: 2 * count].reshape(2, count).T, solution[2 * count :]
+    smooth = np.stack([f - r @ amplitudes for f, r in zip(free, reduced, strict=True)], axis=-1)
+    return smooth, amplitudes
 
 
 def _headings(velocities: Float[Array, "frames 2"]) -> Float[Array, "frames"]:

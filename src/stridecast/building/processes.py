@@ -134,24 +134,29 @@ def _blames_system(error: BaseException | None) -> bool:
 
 @contextmanager
 def _quiet_start() -> Iterator[None]:
-    """Start workers that do not run the caller's script, and that Ctrl-C cannot catch while they are still loading."""
+    """Start workers that do not run the caller's script, and that Ctrl-C cannot reach before they are ready for it."""
     script = sys.modules["__main__"].__dict__
     hidden: dict[str, object] = {name: script[name] for name in ("__file__", "__spec__") if name in script}
-    handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+    script.update((name, None) for name in hidden)
+    before = _block_interrupts()
     try:
-        script.update((name, None) for name in hidden)
-        if handler is not None:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
         yield
     finally:
-        if handler is not None:
-            signal.signal(signal.SIGINT, handler)
+        if before is not None:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         script.update(hidden)
+
+
+def _block_interrupts() -> set[int] | None:
+    """Let Ctrl-C wait, here and in processes that are started; return what waited before (none where that cannot be)."""
+    return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if sys.platform != "win32" else None
 
 
 def _start_worker() -> None:
     """Let a worker die of Ctrl-C without a word, and with its parent, however that ends."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     threading.Thread(target=_follow_parent, daemon=True).start()
 
 

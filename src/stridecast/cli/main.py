@@ -35,12 +35,13 @@ app.command("show")(show.show)
 app.command("walk")(walk.walk)
 
 
-def _version(wanted: bool) -> None:
+def _version(wanted: bool) -> bool:
     if wanted:
         from stridecast import __version__
 
         typer.echo(f"stridecast {__version__}")
         raise typer.Exit
+    return wanted
 
 
 @app.callback()

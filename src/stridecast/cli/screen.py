@@ -55,10 +55,9 @@ def progress(quiet: bool, words: Mapping[str, str]) -> Iterator[Callable[[str, i
             tasks[stage] = bars.add_task(words[stage], total=total)
         bars.update(tasks[stage], completed=done, total=total)
 
-    handler = _Notes()
+    handler = _Notes(logging.ERROR if quiet else logging.WARNING)
     log = logging.getLogger("stridecast")
     log.addHandler(handler)
-    log.setLevel(logging.ERROR if quiet else logging.WARNING)
     try:
         with bars:
             yield show

@@ -200,6 +200,9 @@ def _learn_bounds(
     for name, own in samples.items():
         pooled[name.split("/")[0]] += own
     cyclic = {motion: learn_cyclic(pooled[motion], method) for motion in MOTIONS if motion in pooled}
+    if STAND in cyclic:  # however still people stood, standing quite still is standing
+        fastest = [high for _, high in cyclic[STAND].speed]
+        cyclic[STAND] = replace(cyclic[STAND], speed=((0.0, fastest[0]), (0.0, fastest[1])))
     out = {}
     for name, own in samples.items():
         motion = name.split("/")[0]
@@ -209,7 +212,9 @@ def _learn_bounds(
         segment = by_group[name][0][1]
         before, after = (cyclic.get(_motion_at(kind)) for kind in (segment.start.kind, segment.stop.kind))
         jerk = max((cyclic[end].jerk for end in motion.split("-") if end in cyclic), default=0.0)
-        out[name] = learn_transition(own, before, after, jerk)
+        # Walking changes its force slowly: who comes to it must have done with braking hard.
+        arrives = _motion_at(segment.stop.kind) == motion.split("-")[-1] == WALK
+        out[name] = learn_transition(own, before, after, jerk=jerk, arrives=arrives)
     return out
 
 

@@ -82,8 +82,8 @@ def pull(
 
 @kernel
 def limit(
-    wish_t: float, wish_l: float, had_t: float, had_l: float, speed: float, jerk: float, low: float, high: float,
-    lateral_per_speed: float, slowest: float, fastest: float, dt: float,
+    wish_t: float, wish_l: float, had_t: float, had_l: float, speed: float, jerk: float, later_jerk: float, low: float,
+    high: float, lateral_per_speed: float, slowest: float, fastest: float, dt: float, rising: float = 0.0,
 ) -> tuple[float, float, float, float, float, int]:
     """The acceleration nearest to a wish that keeps every bound (KS07 "Clamping Outliers").
 
@@ -100,9 +100,13 @@ def limit(
     had_t, had_l
         Acceleration of the last frame, in the same frame of reference.
     speed
-        Speed before this frame, m/s.
+        Speed before this frame, m/s; negative while a stop has gone a hair too far.
     jerk, low, high, lateral_per_speed, slowest, fastest
         The bounds.
+    later_jerk
+        Bound on the jerk that will hold when the speed bounds are met: that of the motion a transition leads to.
+    rising
+        How fast the greatest speed rises, m/s2: at this rate the speed may go on growing when it meets it.
 
     Returns
     -------
@@ -114,17 +118,19 @@ def limit(
     acted = 0
 
     # 1. The box. Turning alone adds a little speed each frame; that much is taken off what may be added.
-    wide = lateral_per_speed * speed
+    wide = lateral_per_speed * max(speed, 0.0)
     turned = min(abs(wish_l), wide)
     own = 0.5 * turned * turned * dt / max(speed, 1e-6) if speed > 1e-6 else 0.0
     lowest, highest = low, high
     if speed > slowest:
-        brake = -min(unwinding(speed - slowest, jerk, dt), (speed - slowest) / dt)
+        brake = -min(unwinding(speed - slowest, later_jerk, dt), (speed - slowest) / dt)
     else:
         brake = min(0.0 if speed == slowest else (slowest - speed) / dt, high)
     if brake > lowest:
         lowest = brake
-    push = unwinding(fastest - speed, jerk, dt) if speed < fastest else max((fastest - speed) / dt, low)
+    push = max((fastest - speed) / dt, low)
+    if speed < fastest:
+        push = min(push, rising + unwinding(fastest - speed, later_jerk, dt))
     if push - own < highest:
         highest = push - own
     speed_low, speed_high = lowest > low, highest < high

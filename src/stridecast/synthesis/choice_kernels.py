@@ -10,7 +10,7 @@ from stridecast.database.graph import UNREACHABLE
 from stridecast.geometry.kernels import kernel
 from stridecast.model.database import MARGIN
 from stridecast.synthesis.state import NEIGHBOURS, State
-from stridecast.synthesis.tables import Tables
+from stridecast.synthesis.tables import STOP_TOLERANCE, Tables
 
 SPEED_SCALE, TANGENTIAL_SCALE, LATERAL_SCALE = 0.1, 1.2, 0.45
 """Differences in speed (m/s) and acceleration (m/s2) that weigh as much as each other ..."""
@@ -59,15 +59,15 @@ def next_group(tables: Tables, state: State, c: int, request: int) -> int:
             continue
         steps = tables.steps[h, request]
         cost = 1e9 if steps >= UNREACHABLE else 10.0 * steps
-        # Stay with a transition that is under way, prefer one that is meant for this.
+        # Stay with a transition that is under way, prefer one that is meant for this; begin nothing at a speed it does not know.
         if tables.comes_from[h] != tables.leads_to[h]:
             if tables.leads_to[h] == request:
                 cost -= 2.0
             if tables.label[h] == tables.label[g]:
                 cost -= 3.0
-            cost += 4.0 * misfit(tables, h, speed)
-            if misfit(tables, h, speed) > ENTRY_TOLERANCE:
-                cost += 1e6
+        off = misfit(tables, h, speed)
+        if off > 0.0:
+            cost += 1e6 + 1e4 * off
         cost += min(nearest(tables, state, c, h), 50.0) / 50.0
         if cost < best_cost:
             best, best_cost = h, cost
@@ -81,13 +81,16 @@ def next_group(tables: Tables, state: State, c: int, request: int) -> int:
 
 @kernel
 def misfit(tables: Tables, h: int, speed: float) -> float:
-    """How far a speed lies outside those at which a transition was begun, m/s; slower does for stops, faster for starts."""
+    """How far a speed lies outside those at which a group can begin, m/s; slower does for stops, faster for starts."""
     low, high = tables.entry_speed[h, 0], tables.entry_speed[h, 1]
-    if tables.leads_to[h] < tables.comes_from[h]:
-        return max(speed - high, 0.0)
-    if tables.comes_from[h] == 0:
+    start, goal = tables.comes_from[h], tables.leads_to[h]
+    if start == goal:
+        return max(low - speed - ENTRY_TOLERANCE, speed - high, 0.0)
+    if start == 0:
         return 0.0
-    return max(low - speed, 0.0)
+    if goal < start:
+        return max(speed - high - (STOP_TOLERANCE if goal == 0 else ENTRY_TOLERANCE), 0.0)
+    return max(low - speed - ENTRY_TOLERANCE, 0.0)
 
 
 @kernel

@@ -32,6 +32,9 @@ MOVED = 0.12
 LEFT_BEHIND = 2.0
 """... or is so far away, metres."""
 
+SLOWEST_PACE = 0.4
+"""Starts and stops play no slower than this, as a part of the recorded pace."""
+
 REACTION = 0.2
 """Time until a stop begins, on average, seconds."""
 
@@ -144,7 +147,7 @@ def next_segment_if_due(tables: Tables, state: State, c: int, request: int, dt: 
         begin_segment(tables, state, c, request, 0.0)
         return True
     slope = seconds_per_generic(tables, state, c)
-    state.generic[c] += dt / slope
+    state.generic[c] += dt / slope * pace(tables, state, c, slope)
     g = state.group[c]
     idle = tables.comes_from[g] == STAND and tables.leads_to[g] == STAND
     if state.generic[c] >= 1.0:
@@ -178,6 +181,27 @@ def eased(state: State, c: int, x: float, z: float, k: float, brake: float, jerk
 
 
 @kernel
+def pace(tables: Tables, state: State, c: int, slope: float) -> float:
+    """How fast a start or a stop plays: slower where its vehicle needs longer than the example to get going or to rest.
+
+    Three quarters of the greatest acceleration allowed is what it can count on, as it builds up and is taken back.
+    """
+    g = state.group[c]
+    starts, stops = tables.comes_from[g] == STAND, tables.leads_to[g] == STAND
+    if starts == stops:
+        return 1.0
+    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    left = (1.0 - min(state.generic[c], 1.0)) * slope
+    if stops:
+        need = speed / max(-0.375 * (tables.tangential[g, 0, 0] + tables.tangential[g, 1, 0]), 0.1)
+    else:
+        need = (tables.speed[g, 1, 0] - speed) / max(0.375 * (tables.tangential[g, 0, 1] + tables.tangential[g, 1, 1]), 0.1)
+    if need <= left:
+        return 1.0
+    return max(left / need, SLOWEST_PACE)
+
+
+@kernel
 def move_vehicle(
     tables: Tables,
     state: State,
@@ -195,6 +219,8 @@ def move_vehicle(
     u = min(state.generic[c], 1.0)
     sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
     speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    if state.velocity[c, 0] * sine + state.velocity[c, 1] * cosine < 0.0:
+        speed = -speed
 
     # The bounds of the group, linear from its first frame to its last; speed from what it was when the segment began.
     jerk, wide = tables.jerk[g], tables.lateral_per_speed[g]
@@ -212,10 +238,11 @@ def move_vehicle(
     elif tables.leads_to[g] == STAND:
         # Coming to rest: at the end of the segment, with nothing left of the acceleration.
         if tables.comes_from[g] == STAND:
-            wish_t = -speed / max(3.0 * dt, 0.1)
+            wish_t = -speed / dt
         else:
-            left = max((1.0 - u) * seconds_per_generic(tables, state, c), 2.0 * dt)
-            wish_t = -2.0 * speed / left if speed > 0.02 else -speed / (2.0 * dt)
+            slope = seconds_per_generic(tables, state, c)
+            left = max((1.0 - u) * slope / pace(tables, state, c, slope), 2.0 * dt)
+            wish_t = -2.0 * speed / left if speed > 0.02 else -speed / dt
         wish_l = 0.0
     else:
         k = alpha / beta
@@ -223,13 +250,13 @@ def move_vehicle(
         ease = eased(state, c, x, z, k, 0.5 * (high - low), jerk)
         x, z = ease * x, ease * z
         along, across = x * sine + z * cosine, x * cosine - z * sine
-        at_least, at_most = slowest, fastest
+        at_least, at_most = slowest, fastest + tables.rising[g]  # what rises is not aimed at but passed
         if request == STAND:
             along, across = 0.0, 0.0
-        now = tables.leads_to[g]
-        if request != now:
-            at_least = max(at_least, min(tables.approach[now, request, 0], fastest))
-            at_most = min(at_most, max(tables.approach[now, request, 1], slowest))
+        if tables.comes_from[g] < request:
+            at_least = max(at_least, min(tables.approach[g, request, 0], fastest))
+        elif tables.comes_from[g] > request:
+            at_most = min(at_most, max(tables.approach[g, request, 1], slowest))
         wish_t, wish_l, state.side[c] = pull(
             along, across, speed, at_least, max(at_least, at_most), beta, jerk, state.side[c], dt
         )
@@ -237,7 +264,8 @@ def move_vehicle(
     had_t = state.acceleration[c, 0] * sine + state.acceleration[c, 1] * cosine
     had_l = state.acceleration[c, 0] * cosine - state.acceleration[c, 1] * sine
     t, l, least, most, widest, acted = limit(
-        wish_t, wish_l, had_t, had_l, speed, jerk, low, high, wide, slowest, fastest, dt
+        wish_t, wish_l, had_t, had_l, speed, jerk, tables.later_jerk[g], low, high, wide, slowest, fastest, dt,
+        tables.rising[g],
     )
 
     ax, az = t * sine + l * cosine, t * cosine - l * sine

@@ -8,16 +8,20 @@ import numpy as np
 from jaxtyping import Bool
 
 from stridecast.body import kinematics
-from stridecast.database.graph import connect
+from stridecast.database.graph import UNREACHABLE, TransitionGraph, connect
 from stridecast.errors import DatabaseError
 from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import SIDES
 from stridecast.model.database import MARGIN, MotionDatabase
-from stridecast.model.segment import MOTIONS
+from stridecast.model.group import MotionGroup
+from stridecast.model.segment import MOTIONS, RUN
 from stridecast.model.skeleton import Skeleton
 from stridecast.analysis.take import SOLE
 
 Array = np.ndarray
+
+STOP_TOLERANCE = 0.45
+"""A stop may begin this much faster than its examples did, m/s: its last step is then taken more slowly."""
 
 MOST_KEYS = 8
 """No string has more changes of support than this."""
@@ -44,10 +48,12 @@ class Tables(NamedTuple):
     planted: Array  # G MOST_KEYS+1 2
     entry_speed: Array  # G 2
     jerk: Array  # G
+    later_jerk: Array  # G, of the motion a group leads to if that is less
     tangential: Array  # G 2 2, first and last frame, low and high
     lateral_per_speed: Array  # G
     speed: Array  # G 2 2
-    approach: Array  # 3 3 2, speed range in which a motion is left for another
+    rising: Array  # G, how fast the greatest speed goes on rising after the last frame
+    approach: Array  # G 3 2, speeds at which what follows a group on the way to a motion can begin
     # pose
     references: Array  # J-1 4
     feature_weights: Array  # D
@@ -79,7 +85,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         raise DatabaseError(f"the database holds no standing, walking or running{whose} to synthesise from")
     labels = sorted({g.motion for g in groups})
     skeleton = database.skeleton
-    entry = np.array([_range(examples.parameters[g.rows][allowed[g.rows], 0]) for g in groups])
+    entry = np.array([_entry_speed(g, examples.parameters[g.rows][allowed[g.rows], 0]) for g in groups])
     return Tables(
         features=examples.features,
         times=examples.times,
@@ -97,10 +103,12 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         planted=np.array([_planted(g.string) for g in groups]),
         entry_speed=entry,
         jerk=np.array([g.bounds.jerk for g in groups]),
+        later_jerk=np.array([_later_jerk(g, groups) for g in groups]),
         tangential=np.array([g.bounds.tangential for g in groups]),
         lateral_per_speed=np.array([g.bounds.lateral_per_speed for g in groups]),
         speed=np.array([g.bounds.speed for g in groups]),
-        approach=_approach(database, entry, usable),
+        rising=np.array([_rising(g) for g in groups]),
+        approach=_approach(groups, entry, graph),
         references=database.references,
         feature_weights=_feature_weights(skeleton),
         parents=np.array(skeleton.parents),
@@ -137,8 +145,13 @@ def _parameters(database: MotionDatabase) -> Array:
     return np.stack((speed, gained / examples.durations, lateral), axis=-1)
 
 
-def _range(values: Array) -> tuple[float, float]:
-    return (float(values.min()), float(values.max())) if len(values) else (0.0, 0.0)
+def _entry_speed(group: MotionGroup, speeds: Array) -> tuple[float, float]:
+    """Speeds at which a group can begin: those of its examples; for a motion that repeats, those of its bounds."""
+    if len(speeds) == 0:
+        return 0.0, 0.0
+    if group.comes_from == group.leads_to:
+        return group.bounds.speed[0]
+    return float(speeds.min()), float(speeds.max())
 
 
 def _planted(string: str) -> Array:
@@ -149,20 +162,34 @@ def _planted(string: str) -> Array:
     return out
 
 
-def _approach(database: MotionDatabase, entry: Array, usable: Array) -> Array:
-    """Range of speeds in which one motion is left for another: those at which its transitions begin."""
-    out = np.zeros((len(MOTIONS), len(MOTIONS), 2))
+def _later_jerk(group: MotionGroup, groups: tuple[MotionGroup, ...]) -> float:
+    return min([group.bounds.jerk] + [g.bounds.jerk for g in groups if g.motion == group.leads_to])
+
+
+def _rising(group: MotionGroup) -> float:
+    """In the midst of a transition to something faster the next segment goes on as this one ends."""
+    arrived = group.stop.startswith("F") if group.leads_to == RUN else group.stop in ("L", "R")
+    faster = MOTIONS.index(group.leads_to) > MOTIONS.index(group.comes_from)
+    return group.bounds.tangential[1][1] if faster and not arrived else 0.0
+
+
+def _approach(groups: tuple[MotionGroup, ...], entry: Array, graph: TransitionGraph) -> Array:
+    """For each group and motion asked for: the speeds at which the next group on the way can begin.
+
+    That is the follower with the fewest steps left whose speeds the group's own bounds allow to be reached.
+    """
+    out = np.zeros((len(groups), len(MOTIONS), 2))
     out[..., 1] = np.inf
-    for i, a in enumerate(MOTIONS):
-        leaves = {g.stop for g in database.groups if g.motion == a}
-        for j, b in enumerate(MOTIONS):
-            rows = [
-                k
-                for k, g in enumerate(database.groups)
-                if usable[k] and g.motion == f"{a}-{b}" and g.start in leaves
-            ]
-            if i != j and rows:
-                out[i, j] = entry[rows, 0].min(), entry[rows, 1].max()
+    for i, group in enumerate(groups):
+        slowest, fastest = group.bounds.speed[1]
+        for m in range(len(MOTIONS)):
+            ways = [k for k in np.flatnonzero(graph.follows[i]) if graph.steps[k, m] < UNREACHABLE]
+            reachable = [k for k in ways if entry[k, 0] <= fastest + 0.1 and entry[k, 1] >= slowest - 0.1]
+            if not reachable:
+                continue
+            fewest = min(graph.steps[k, m] for k in reachable)
+            nearest = [k for k in reachable if graph.steps[k, m] == fewest]
+            out[i, m] = entry[nearest, 0].min(), entry[nearest, 1].max() + (STOP_TOLERANCE if m == 0 else 0.0)
     return out
 
 

@@ -302,13 +302,13 @@ class Walker:
             root_position=pose.root_position[0],
             rotations=pose.rotations[0],
             vehicle=VehicleState(
-                position=v.position[0], velocity=v.velocity[0], acceleration=v.acceleration[0], heading=v.heading[0]
+                position=v.position[0], velocity=v.velocity[0], acceleration=v.acceleration[0], heading=np.asarray(v.heading)[0]
             ),
             planted=pose.planted[0],
             motion=pose.motion[0],
             group=pose.group[0],
             clamped=pose.clamped[0],  # type: ignore[arg-type]
-            bounds=BoundsInForce(jerk=b.jerk[0], tangential=b.tangential[0], lateral=b.lateral[0], speed=b.speed[0]),
+            bounds=BoundsInForce(jerk=np.asarray(b.jerk)[0], tangential=b.tangential[0], lateral=np.asarray(b.lateral)[0], speed=b.speed[0]),
         )
 
 
