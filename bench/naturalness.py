@@ -79,7 +79,10 @@ def main() -> None:
             near = [m for m in people[motion] if abs(m[0] - speed) < NEAR]
             if near:
                 low, high = np.min(near, axis=0), np.max(near, axis=0)
-                print(f"{motion} {speed} recorded ({len(near):2d})" + "".join(f"{a:8.1f}-{b:<7.1f}" for a, b in zip(low, high, strict=True)))
+                print(
+                    f"{motion} {speed} recorded ({len(near):2d})"
+                    + "".join(f"{a:8.1f}-{b:<7.1f}" for a, b in zip(low, high, strict=True))
+                )
             found = walked(database, motion, speed)
             if found is not None:
                 print(f"{motion} {speed} walker       " + "".join(f"{v:16.2f}" for v in found))

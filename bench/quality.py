@@ -106,11 +106,19 @@ def report(journey: Journey) -> None:
     near, elsewhere = seams(journey)
     world = kinematics.pose(motion)
     lowest = min(world.positions[..., 1].min(), kinematics.ends(motion.skeleton, world)[..., 1].min())
-    print(f"  planted toes travel, held contacts:     median {np.median(held):5.1f} mm, 95 % {np.percentile(held, 95):5.1f} mm ({len(held)})")
-    print(f"  planted toes travel, contacts as found: median {np.median(seen):5.1f} mm, 95 % {np.percentile(seen, 95):5.1f} mm ({len(seen)})")
-    print(f"  angular acceleration, 99 %: {near:.0f} near seams, {elsewhere:.0f} elsewhere, ratio {near / elsewhere:.2f}")
+    print(
+        f"  planted toes travel, held contacts:     median {np.median(held):5.1f} mm, 95 % {np.percentile(held, 95):5.1f} mm ({len(held)})"
+    )
+    print(
+        f"  planted toes travel, contacts as found: median {np.median(seen):5.1f} mm, 95 % {np.percentile(seen, 95):5.1f} mm ({len(seen)})"
+    )
+    print(
+        f"  angular acceleration, 99 %: {near:.0f} near seams, {elsewhere:.0f} elsewhere, ratio {near / elsewhere:.2f}"
+    )
     bends = knee_bends(motion)
-    print(f"  knees bend {bends.min():.1f} to {bends.max():.0f} degrees; lowest point {1000 * lowest:.0f} mm; made up {journey.made_up}")
+    print(
+        f"  knees bend {bends.min():.1f} to {bends.max():.0f} degrees; lowest point {1000 * lowest:.0f} mm; made up {journey.made_up}"
+    )
 
 
 def main() -> None:
@@ -130,7 +138,9 @@ def main() -> None:
             kind = "run" if any(s.motion == "run" for s in take.gait.segments) else "walk"
             people[kind] += toe_travel(take.motion, take.contacts.planted)
         for kind, found in people.items():
-            print(f"recordings, {kind}: median {np.median(found):.1f} mm, 95 % {np.percentile(found, 95):.1f} mm ({len(found)})")
+            print(
+                f"recordings, {kind}: median {np.median(found):.1f} mm, 95 % {np.percentile(found, 95):.1f} mm ({len(found)})"
+            )
 
 
 if __name__ == "__main__":

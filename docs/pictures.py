@@ -148,7 +148,9 @@ def contacts(takes: list[TakeAnalysis]) -> None:
             toe = take.motion.skeleton.joint(("left_toe", "right_toe")[side])
             axes.plot(seconds, world[:, toe, 1], color=colour, linewidth=1.1, label=("left toe", "right toe")[side])
             low = -0.05 - 0.03 * side
-            axes.fill_between(seconds, low, low + 0.022, where=take.contacts.planted[:, side], color=colour, linewidth=0)
+            axes.fill_between(
+                seconds, low, low + 0.022, where=take.contacts.planted[:, side], color=colour, linewidth=0
+            )
         axes.fill_between(seconds, -0.11, -0.088, where=take.contacts.standing, color="black", linewidth=0)
         for segment in take.gait.segments:
             middle = (segment.start.frame + segment.stop.frame) / 2 / take.motion.frame_rate

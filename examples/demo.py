@@ -21,8 +21,10 @@ from stridecast.formats.trace import write_trace
 from stridecast.synthesis.journey import PointStream, follow
 
 HERE = Path(__file__).resolve().parent
-TAKES = ("16_08 16_11 16_13 16_15 16_17 16_19 16_21 16_23 16_25 16_27 16_29 16_31 16_33 16_35 16_37 16_41 16_55 16_58 "
-         "127_03 127_04 127_05 127_17").split()
+TAKES = (
+    "16_08 16_11 16_13 16_15 16_17 16_19 16_21 16_23 16_25 16_27 16_29 16_31 16_33 16_35 16_37 16_41 16_55 16_58 "
+    "127_03 127_04 127_05 127_17"
+).split()
 OUT = Path("demo")
 
 # What the point does: seconds, speed (m/s), turning (rad/s), motion asked for.
@@ -82,10 +84,16 @@ def formulas(folder: Path) -> list[Path]:
     from synthetic_gait import gait, ramps
 
     folder.mkdir(parents=True, exist_ok=True)
-    takes = {f"walk_{speed}_{bend}": gait(np.full(300, speed), curvature=bend)
-             for speed in (0.7, 1.0, 1.3, 1.6) for bend in (-0.5, 0.0, 0.5)}
-    takes |= {f"run_{speed}_{bend}": gait(np.full(240, speed), curvature=bend)
-              for speed in (2.6, 3.2, 3.8) for bend in (-0.25, 0.0, 0.25)}
+    takes = {
+        f"walk_{speed}_{bend}": gait(np.full(300, speed), curvature=bend)
+        for speed in (0.7, 1.0, 1.3, 1.6)
+        for bend in (-0.5, 0.0, 0.5)
+    }
+    takes |= {
+        f"run_{speed}_{bend}": gait(np.full(240, speed), curvature=bend)
+        for speed in (2.6, 3.2, 3.8)
+        for bend in (-0.25, 0.0, 0.25)
+    }
     takes["start_and_stop"] = gait(ramps((1.5, 0.0), (3.0, 1.2), (1.5, 0.0)))
     takes["to_run_and_stop"] = gait(ramps((1.5, 0.0), (2.0, 1.4), (3.0, 3.2), (2.0, 1.4), (1.5, 0.0)))
     for name, take in takes.items():

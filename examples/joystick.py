@@ -1,6 +1,6 @@
 """A character driven by forces, as a joystick gives them: walk, lean to the left, run, let go.
 
-    python examples/joystick.py DATABASE
+python examples/joystick.py DATABASE
 """
 
 from __future__ import annotations
@@ -21,11 +21,15 @@ def main() -> None:
         seconds = frame / walker.frame_rate
         heading = 0.0 if frame == 0 else float(pose.vehicle.heading)  # noqa: F821 - of the frame before
         push, lean = (1.0, 0.0) if seconds < 2 else (0.0, 1.0) if seconds < 5 else (2.0, 0.0)
-        force = push * np.array([np.sin(heading), np.cos(heading)]) + lean * np.array([np.cos(heading), -np.sin(heading)])
+        force = push * np.array([np.sin(heading), np.cos(heading)]) + lean * np.array(
+            [np.cos(heading), -np.sin(heading)]
+        )
         pose = walker.step(force=force, motion="walk" if seconds < 5 else "run")
         if frame % 15 == 0:
             x, z = pose.vehicle.position
-            print(f"{seconds:5.2f} s  {pose.group:14s} at ({x:6.2f}, {z:6.2f})  {np.linalg.norm(pose.vehicle.velocity):.2f} m/s")
+            print(
+                f"{seconds:5.2f} s  {pose.group:14s} at ({x:6.2f}, {z:6.2f})  {np.linalg.norm(pose.vehicle.velocity):.2f} m/s"
+            )
 
 
 if __name__ == "__main__":

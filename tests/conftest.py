@@ -22,6 +22,7 @@ SOURCES = ROOT / "src"
 # numba compiles these: a wrapped function is none that it can read
 COMPILED = ("kernels",)
 
+
 def checked_modules() -> list[str]:
     """Every module of the package whose shapes and types are checked while tests run (packages only re-export)."""
     names = []

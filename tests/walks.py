@@ -135,7 +135,7 @@ def random_walk(database: MotionDatabase, seed: int, frames: int, rate: float, *
 
 @dataclass(frozen=True)
 class Steering:
-    """What the vehicles did in each frame but the first, in the frame of the direction they had: (frames - 1, characters)."""
+    """What the vehicles did in each frame but the first, along and across the direction they had."""
 
     tangential: np.ndarray
     lateral: np.ndarray

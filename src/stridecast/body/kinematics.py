@@ -52,7 +52,9 @@ def ends(skeleton: Skeleton, world: World) -> Float[np.ndarray, "*shape ends 3"]
     return world.positions[..., hang, :] + quat.rotate(world.rotations[..., hang, :], skeleton.end_offsets)
 
 
-def local(skeleton: Skeleton, world_rotations: Float[np.ndarray, "*shape joints 4"]) -> Float[np.ndarray, "*shape joints 4"]:
+def local(
+    skeleton: Skeleton, world_rotations: Float[np.ndarray, "*shape joints 4"]
+) -> Float[np.ndarray, "*shape joints 4"]:
     """Local rotations of joint rotations in the world; inverse of what ``forward`` does to rotations."""
     out = world_rotations.copy()
     out[..., 1:, :] = quat.multiply(

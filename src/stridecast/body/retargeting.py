@@ -66,9 +66,7 @@ def retarget(motion: Motion, skeleton: Skeleton) -> Motion:
         foot, toe_joint = skeleton.chain(f"{side}_foot", f"{side}_toe")
         ankle = toe - quat.rotate(turned[:, foot], skeleton.offsets[toe_joint])
         rotations = reach(skeleton, root, rotations, side, ankle)
-    return replace(
-        motion, skeleton=skeleton, root_positions=root, rotations=quat.continuous(quat.normalize(rotations))
-    )
+    return replace(motion, skeleton=skeleton, root_positions=root, rotations=quat.continuous(quat.normalize(rotations)))
 
 
 def _world_rotations(
@@ -105,7 +103,9 @@ def _hip_middle(skeleton: Skeleton, positions: Float[np.ndarray, "frames joints 
     return positions[:, skeleton.chain("left_thigh", "right_thigh")].mean(axis=1)
 
 
-def _hip_middle_offset(skeleton: Skeleton, root_rotations: Float[np.ndarray, "frames 4"]) -> Float[np.ndarray, "frames 3"]:
+def _hip_middle_offset(
+    skeleton: Skeleton, root_rotations: Float[np.ndarray, "frames 4"]
+) -> Float[np.ndarray, "frames 3"]:
     """From the root to the middle between the hip joints, in the world."""
     middle = _hip_middle(skeleton, kinematics.rest(skeleton).positions[None])[0]
     return quat.rotate(root_rotations, middle)

@@ -178,7 +178,10 @@ def _group_order(name: str) -> tuple[int, str]:
 def _references(analysed: Sequence[AnalysedTake]) -> Float[Array, "bones 4"]:
     """Mean rotation of each joint over everything, every take counting alike."""
     sample = np.concatenate(
-        [a.analysis.motion.rotations[np.linspace(0, a.analysis.motion.frames - 1, 32).astype(int), 1:] for a in analysed]
+        [
+            a.analysis.motion.rotations[np.linspace(0, a.analysis.motion.frames - 1, 32).astype(int), 1:]
+            for a in analysed
+        ]
     )
     return quat.mean(sample)
 
@@ -191,9 +194,7 @@ def _mean_keys(segments: Sequence[Segment]) -> Float[Array, "keys"]:
     return np.minimum(np.maximum(shares, lows), 1 - lows[::-1])
 
 
-def _learn_bounds(
-    by_group: dict[str, list[tuple[AnalysedTake, Segment]]], method: str
-) -> dict[str, SteeringBounds]:
+def _learn_bounds(by_group: dict[str, list[tuple[AnalysedTake, Segment]]], method: str) -> dict[str, SteeringBounds]:
     """Bounds of each group; left and right halves of a cycle steer alike and share theirs."""
     samples = {name: [a.analysis.steering(s) for a, s in members] for name, members in by_group.items()}
     pooled: dict[str, list[SteeringSamples]] = defaultdict(list)
@@ -258,9 +259,7 @@ def _example(
     return {
         "features": _sample(inside, series, frames),
         "times": (frames - start) / rate,
-        "parameters": np.array(
-            [vehicle.speeds[start], vehicle.tangential[start], vehicle.lateral[start]]
-        ),
+        "parameters": np.array([vehicle.speeds[start], vehicle.tangential[start], vehicle.lateral[start]]),
         "travelled": _sample(inside, travelled, frames),
         "durations": length / rate,
         "takes": source.take,
@@ -269,9 +268,7 @@ def _example(
     }
 
 
-def warp(
-    keys: Float[Array, "keys"], own: Float[Array, "keys"], length: float
-) -> Float[Array, "rows"]:
+def warp(keys: Float[Array, "keys"], own: Float[Array, "keys"], length: float) -> Float[Array, "rows"]:
     """Own time of an example at every generic sample: monotone, smooth, its keys on the group's keys."""
     own = np.clip(own, length * 0.02 * np.arange(1, len(own) + 1), length * (1 - 0.02 * np.arange(len(own), 0, -1)))
     curve = PchipInterpolator(np.concatenate(([0.0], keys, [1.0])), np.concatenate(([0.0], own, [length])))
@@ -300,5 +297,3 @@ def _account(
             left_out = ("no whole half cycle and no standing in it",)
         out.append(replace(take, segments=int(counts[i]), left_out=left_out))
     return tuple(out)
-
-

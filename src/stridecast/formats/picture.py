@@ -59,7 +59,9 @@ def plotting() -> Any:
     return figure
 
 
-def write_picture(path: str | Path, journey: Journey, *, every: float = 0.45, size: tuple[float, float] = (13, 6.2)) -> None:
+def write_picture(
+    path: str | Path, journey: Journey, *, every: float = 0.45, size: tuple[float, float] = (13, 6.2)
+) -> None:
     """Draw a walk as a PNG: a body every so many seconds, the trails of input, vehicle and pelvis, and the footprints.
 
     Parameters
@@ -102,9 +104,7 @@ class Camera:
     """
 
     def __init__(self, target: Float[Array, "3"], distance: float, azimuth: float, elevation: float) -> None:
-        away = np.array(
-            [np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)]
-        )
+        away = np.array([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)])
         self.place = target + distance * away
         self.right = np.cross([0.0, 1.0, 0.0], away)
         self.right /= np.linalg.norm(self.right)
@@ -206,10 +206,11 @@ def _draw_footprints(axes: Axes, camera: Camera, journey: Journey, positions: Fl
     skeleton = journey.motion.skeleton
     for side, (name, colour) in enumerate((("left", LEFT), ("right", RIGHT))):
         planted = np.concatenate(([False], journey.planted[:, side], [False]))
-        begins, stops = np.flatnonzero(np.diff(planted.astype(int)) > 0), np.flatnonzero(np.diff(planted.astype(int)) < 0)
+        begins, stops = (
+            np.flatnonzero(np.diff(planted.astype(int)) > 0),
+            np.flatnonzero(np.diff(planted.astype(int)) < 0),
+        )
         for frame in (begins + stops) // 2:
             foot = positions[frame, skeleton.chain(f"{name}_foot", f"{name}_toe")] * np.array([1.0, 0.0, 1.0])
             seen, depth = camera.see(foot)
-            axes.plot(
-                *seen.T, color=colour, linewidth=60 / depth[0], alpha=0.35, solid_capstyle="round", zorder=1
-            )
+            axes.plot(*seen.T, color=colour, linewidth=60 / depth[0], alpha=0.35, solid_capstyle="round", zorder=1)

@@ -48,7 +48,9 @@ def read_points(path: str | Path, motion: str = "walk") -> PointStream:
         what = f"column 'time': {times[i]:.12g} s comes after {times[i - 1]:.12g} s; time must run forwards"
         raise FileError(what, path=path, line=rows[i].line)
     if times[-1] - times[0] > LONGEST:
-        what = f"column 'time': the stream lasts {times[-1] - times[0]:.6g} s, more than two hours; times are in seconds"
+        what = (
+            f"column 'time': the stream lasts {times[-1] - times[0]:.6g} s, more than two hours; times are in seconds"
+        )
         raise FileError(what, path=path, line=rows[-1].line)
     return PointStream(times=times, points=numbers[:, 1:], motions=tuple(_motion(path, row) or motion for row in rows))
 

@@ -23,7 +23,9 @@ def kernel(function: Any) -> Any:
 def _sources() -> tuple[tuple[str, float, int], ...]:
     """Every file that compiled code is made of, with its time and size."""
     files = resources.files("stridecast").rglob("*.py")  # type: ignore[attr-defined]
-    stats = [(path.name, path.stat()) for path in files if path.stem.endswith("kernels") or path.parent.name == "synthesis"]
+    stats = [
+        (path.name, path.stat()) for path in files if path.stem.endswith("kernels") or path.parent.name == "synthesis"
+    ]
     return tuple(sorted((name, stat.st_mtime, stat.st_size) for name, stat in stats))
 
 

@@ -34,8 +34,15 @@ def unwinding(error: float, jerk: float, dt: float) -> float:
 
 @kernel
 def pull(
-    tangential: float, lateral: float, speed: float, slowest: float, fastest: float, beta: float, jerk: float,
-    side: float, dt: float,
+    tangential: float,
+    lateral: float,
+    speed: float,
+    slowest: float,
+    fastest: float,
+    beta: float,
+    jerk: float,
+    side: float,
+    dt: float,
 ) -> tuple[float, float, float]:
     """Wished acceleration of a spring-damper towards a wished velocity, without swinging past it.
 
@@ -82,8 +89,20 @@ def pull(
 
 @kernel
 def limit(
-    wish_t: float, wish_l: float, had_t: float, had_l: float, speed: float, jerk: float, later_jerk: float, low: float,
-    high: float, lateral_per_speed: float, slowest: float, fastest: float, dt: float, rising: float = 0.0,
+    wish_t: float,
+    wish_l: float,
+    had_t: float,
+    had_l: float,
+    speed: float,
+    jerk: float,
+    later_jerk: float,
+    low: float,
+    high: float,
+    lateral_per_speed: float,
+    slowest: float,
+    fastest: float,
+    dt: float,
+    rising: float = 0.0,
 ) -> tuple[float, float, float, float, float, int]:
     """The acceleration nearest to a wish that keeps every bound (KS07 "Clamping Outliers").
 

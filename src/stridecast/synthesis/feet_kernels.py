@@ -298,9 +298,7 @@ def bend_leg(tables, state, c, side):  # type: ignore[no-untyped-def]
     on = rotate(bend, on)
     swing = between(add(down, on), subtract(goal, hip))
     whole = multiply(swing, bend)
-    set_quaternion(
-        state.rotations, c, thigh, normalize(multiply(inverse(above_thigh), multiply(swing, thigh_turn)))
-    )
+    set_quaternion(state.rotations, c, thigh, normalize(multiply(inverse(above_thigh), multiply(swing, thigh_turn))))
     set_quaternion(
         state.rotations, c, shin, normalize(multiply(inverse(multiply(swing, above_shin)), multiply(whole, shin_turn)))
     )

@@ -50,7 +50,9 @@ class PointStream:
         if len(times) == 0:
             raise WishError("the stream has no sample")
         if points.shape != (len(times), 2) or len(self.motions) != len(times):
-            raise WishError(f"{len(times)} times, points of shape {points.shape} and {len(self.motions)} motions differ")
+            raise WishError(
+                f"{len(times)} times, points of shape {points.shape} and {len(self.motions)} motions differ"
+            )
         for name, bad in (
             ("time", ~np.isfinite(times)),
             ("point", ~np.isfinite(points).all(axis=1)),

@@ -195,7 +195,9 @@ def pace(tables: Tables, state: State, c: int, slope: float) -> float:
     if stops:
         need = speed / max(-0.375 * (tables.tangential[g, 0, 0] + tables.tangential[g, 1, 0]), 0.1)
     else:
-        need = (tables.speed[g, 1, 0] - speed) / max(0.375 * (tables.tangential[g, 0, 1] + tables.tangential[g, 1, 1]), 0.1)
+        need = (tables.speed[g, 1, 0] - speed) / max(
+            0.375 * (tables.tangential[g, 0, 1] + tables.tangential[g, 1, 1]), 0.1
+        )
     if need <= left:
         return 1.0
     return max(left / need, SLOWEST_PACE)
@@ -264,7 +266,19 @@ def move_vehicle(
     had_t = state.acceleration[c, 0] * sine + state.acceleration[c, 1] * cosine
     had_l = state.acceleration[c, 0] * cosine - state.acceleration[c, 1] * sine
     t, l, least, most, widest, acted = limit(
-        wish_t, wish_l, had_t, had_l, speed, jerk, tables.later_jerk[g], low, high, wide, slowest, fastest, dt,
+        wish_t,
+        wish_l,
+        had_t,
+        had_l,
+        speed,
+        jerk,
+        tables.later_jerk[g],
+        low,
+        high,
+        wide,
+        slowest,
+        fastest,
+        dt,
         tables.rising[g],
     )
 

@@ -126,7 +126,9 @@ def _allowed(database: MotionDatabase, subject: str | None) -> Bool[Array, "exam
     if subject is None:
         return np.ones(len(database.examples.durations), bool)
     if subject not in database.subjects:
-        raise DatabaseError(f"there is no subject {subject!r} in the database; there are {', '.join(database.subjects)}")
+        raise DatabaseError(
+            f"there is no subject {subject!r} in the database; there are {', '.join(database.subjects)}"
+        )
     of_take = np.array([take.subject == subject for take in database.takes])
     return of_take[database.examples.takes]
 
@@ -231,8 +233,6 @@ def _bones(skeleton: Skeleton) -> Array:
     at = kinematics.rest(skeleton).positions
     legs = [skeleton.chain(*(f"{s}_{part}" for part in ("thigh", "shin", "foot"))) for s in SIDES]
     return np.array([np.linalg.norm(np.diff(at[leg], axis=0), axis=-1) for leg in legs])
-
-
 
 
 def _tips(skeleton: Skeleton) -> Array:

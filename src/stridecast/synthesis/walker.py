@@ -24,7 +24,11 @@ Array = np.ndarray
 log = logging.getLogger("stridecast")
 
 _NAMES = tuple(
-    tuple(name for bit, name in ((JERK, "jerk"), (TANGENTIAL, "tangential"), (LATERAL, "lateral"), (SPEED, "speed")) if bits & bit)
+    tuple(
+        name
+        for bit, name in ((JERK, "jerk"), (TANGENTIAL, "tangential"), (LATERAL, "lateral"), (SPEED, "speed"))
+        if bits & bit
+    )
     for bits in range(16)
 )
 
@@ -146,16 +150,16 @@ class Walkers:
         self._advance()
         return self._pose()
 
-    def _take_wish(
-        self, points: Array | None, forces: Array | None, motion: str | Sequence[str]
-    ) -> None:
+    def _take_wish(self, points: Array | None, forces: Array | None, motion: str | Sequence[str]) -> None:
         """Check a wish whole before any of it is stored."""
         if (points is None) == (forces is None):
             raise WishError("give either points or forces")
         by_force = points is None
         wish = np.asarray(forces if by_force else points, np.float64)
         if wish.shape != self._points.shape:
-            raise WishError(f"{'forces' if by_force else 'points'} must have shape {self._points.shape}, not {wish.shape}")
+            raise WishError(
+                f"{'forces' if by_force else 'points'} must have shape {self._points.shape}, not {wish.shape}"
+            )
         if not np.isfinite(wish).all():
             row = int(np.flatnonzero(~np.isfinite(wish).all(axis=1))[0])
             raise WishError(f"the wish of character {row} is {wish[row].tolist()}: finite numbers are wanted")
@@ -302,13 +306,21 @@ class Walker:
             root_position=pose.root_position[0],
             rotations=pose.rotations[0],
             vehicle=VehicleState(
-                position=v.position[0], velocity=v.velocity[0], acceleration=v.acceleration[0], heading=np.asarray(v.heading)[0]
+                position=v.position[0],
+                velocity=v.velocity[0],
+                acceleration=v.acceleration[0],
+                heading=np.asarray(v.heading)[0],
             ),
             planted=pose.planted[0],
             motion=pose.motion[0],
             group=pose.group[0],
             clamped=pose.clamped[0],  # type: ignore[arg-type]
-            bounds=BoundsInForce(jerk=np.asarray(b.jerk)[0], tangential=b.tangential[0], lateral=np.asarray(b.lateral)[0], speed=b.speed[0]),
+            bounds=BoundsInForce(
+                jerk=np.asarray(b.jerk)[0],
+                tangential=b.tangential[0],
+                lateral=np.asarray(b.lateral)[0],
+                speed=b.speed[0],
+            ),
         )
 
 
