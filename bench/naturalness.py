@@ -1,6 +1,7 @@
 """Does the pelvis of a walker sway, bounce and turn as people's do at that speed? One measure for both.
 
-Every recording that goes straight ahead at an even speed, and a walker asked for that speed, go through the same analysis.
+Every recording that goes straight ahead at an even speed, and a walker asked for that speed, go through the same
+analysis.
 
     python bench/naturalness.py DATABASE RECORDINGS_FOLDER
 """

@@ -1,9 +1,10 @@
-"""A minute of everything: do feet stay, do seams show, do knees bend the right way, is anybody under the floor?
+"""A minute of everything: whether feet stay, seams show, knees bend the right way and all keep above the floor.
 
     python bench/quality.py DATABASE [RECORDINGS_FOLDER]
 
-The stream has a standing start, straight walking, a 90-degree turn, a circle, a reversal, a run, a stop and a trembling hand. It is
-walked with everybody's examples and held to each person's named below. Recordings, where given, go through the same measures.
+The stream has a standing start, straight walking, a 90-degree turn, a circle, a reversal, a run, a stop and a trembling
+hand. It is walked with everybody's examples and held to each person's named below. Recordings, where given, go through
+the same measures.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from stridecast.synthesis.journey import Journey, PointStream, follow
 SUBJECTS = (None, "16")
 RATE = 30.0
 
-# Seconds, speed (m/s), turning (rad/s), sudden turn at the beginning (rad), motion asked for, trembling of the hand (m).
+# Seconds, speed (m/s), turning (rad/s), sudden turn at the beginning (rad), motion asked for, trembling hand (m).
 COURSE = (
     (2.0, 0.0, 0.0, 0.0, "walk", 0.0),
     (6.0, 1.3, 0.0, 0.0, "walk", 0.0),
@@ -107,17 +108,20 @@ def report(journey: Journey) -> None:
     world = kinematics.pose(motion)
     lowest = min(world.positions[..., 1].min(), kinematics.ends(motion.skeleton, world)[..., 1].min())
     print(
-        f"  planted toes travel, held contacts:     median {np.median(held):5.1f} mm, 95 % {np.percentile(held, 95):5.1f} mm ({len(held)})"
+        f"  planted toes travel, held contacts:     median {np.median(held):5.1f} mm, "
+        f"95 % {np.percentile(held, 95):5.1f} mm ({len(held)})"
     )
     print(
-        f"  planted toes travel, contacts as found: median {np.median(seen):5.1f} mm, 95 % {np.percentile(seen, 95):5.1f} mm ({len(seen)})"
+        f"  planted toes travel, contacts as found: median {np.median(seen):5.1f} mm, "
+        f"95 % {np.percentile(seen, 95):5.1f} mm ({len(seen)})"
     )
     print(
         f"  angular acceleration, 99 %: {near:.0f} near seams, {elsewhere:.0f} elsewhere, ratio {near / elsewhere:.2f}"
     )
     bends = knee_bends(motion)
     print(
-        f"  knees bend {bends.min():.1f} to {bends.max():.0f} degrees; lowest point {1000 * lowest:.0f} mm; made up {journey.made_up}"
+        f"  knees bend {bends.min():.1f} to {bends.max():.0f} degrees; lowest point {1000 * lowest:.0f} mm; "
+        f"made up {journey.made_up}"
     )
 
 
@@ -139,7 +143,8 @@ def main() -> None:
             people[kind] += toe_travel(take.motion, take.contacts.planted)
         for kind, found in people.items():
             print(
-                f"recordings, {kind}: median {np.median(found):.1f} mm, 95 % {np.percentile(found, 95):.1f} mm ({len(found)})"
+                f"recordings, {kind}: median {np.median(found):.1f} mm, "
+                f"95 % {np.percentile(found, 95):.1f} mm ({len(found)})"
             )
 
 

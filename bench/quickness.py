@@ -1,7 +1,7 @@
 """How quick are people, and how quick is a walker? One measure for both.
 
-A recording and a walk go through the same analysis: contacts, gait, vehicle. Of the vehicle's speed or heading, the time
-from 10 to 90 % of the change is taken.
+A recording and a walk go through the same analysis: contacts, gait, vehicle. Of the vehicle's speed or heading, the
+time from 10 to 90 % of the change is taken.
 
     python bench/quickness.py DATABASE RECORDINGS_FOLDER
 """

@@ -2,7 +2,8 @@
 
     python docs/pictures.py RECORDINGS_FOLDER [DATABASE]
 
-``RECORDINGS_FOLDER`` holds CMU takes by subject (``16/16_27.amc`` and so on); the database is built from it if left out.
+``RECORDINGS_FOLDER`` holds CMU takes by subject (``16/16_27.amc`` and so on); the database is built from it if left
+out.
 """
 
 from __future__ import annotations

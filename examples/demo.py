@@ -3,8 +3,8 @@
     python examples/demo.py [RECORDINGS...]
 
 Without recordings of yours it takes some of CMU's, if a folder of them lies where STRIDECAST_MOCAP says or beside this
-project in ../shared/mocap. Where there are none, it learns from a person made of formulas: everything works, but nobody will
-take that for a human walk.
+project in ../shared/mocap. Where there are none, it learns from a person made of formulas: everything works, but nobody
+will take that for a human walk.
 """
 
 from __future__ import annotations
@@ -21,10 +21,11 @@ from stridecast.formats.trace import write_trace
 from stridecast.synthesis.journey import PointStream, follow
 
 HERE = Path(__file__).resolve().parent
-TAKES = (
-    "16_08 16_11 16_13 16_15 16_17 16_19 16_21 16_23 16_25 16_27 16_29 16_31 16_33 16_35 16_37 16_41 16_55 16_58 "
-    "127_03 127_04 127_05 127_17"
-).split()
+SUBJECTS = {
+    16: (8, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31, 33, 35, 37, 41, 55, 58),
+    127: (3, 4, 5, 17),
+}
+TAKES = [f"{subject}_{take:02d}" for subject, takes in SUBJECTS.items() for take in takes]
 OUT = Path("demo")
 
 # What the point does: seconds, speed (m/s), turning (rad/s), motion asked for.

@@ -17,19 +17,19 @@ def main() -> None:
         print(__doc__)
         return
     walker = sc.Walker(sc.load_database(sys.argv[1]))
+    heading = 0.0
     for frame in range(240):
         seconds = frame / walker.frame_rate
-        heading = 0.0 if frame == 0 else float(pose.vehicle.heading)  # noqa: F821 - of the frame before
         push, lean = (1.0, 0.0) if seconds < 2 else (0.0, 1.0) if seconds < 5 else (2.0, 0.0)
         force = push * np.array([np.sin(heading), np.cos(heading)]) + lean * np.array(
             [np.cos(heading), -np.sin(heading)]
         )
         pose = walker.step(force=force, motion="walk" if seconds < 5 else "run")
+        heading = float(pose.vehicle.heading)
         if frame % 15 == 0:
             x, z = pose.vehicle.position
-            print(
-                f"{seconds:5.2f} s  {pose.group:14s} at ({x:6.2f}, {z:6.2f})  {np.linalg.norm(pose.vehicle.velocity):.2f} m/s"
-            )
+            speed = np.linalg.norm(pose.vehicle.velocity)
+            print(f"{seconds:5.2f} s  {pose.group:14s} at ({x:6.2f}, {z:6.2f})  {speed:.2f} m/s")
 
 
 if __name__ == "__main__":

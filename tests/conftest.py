@@ -12,26 +12,13 @@ from hypothesis import HealthCheck, settings
 from jaxtyping import config, install_import_hook
 from threadpoolctl import threadpool_limits
 
+from typechecks import checked_modules
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of what is loaded later
 SINGLE_THREADED = threadpool_limits(1)  # the matrices are small: threads would only wait for each other
 
 TESTS = Path(__file__).resolve().parent
 ROOT = TESTS.parent
-SOURCES = ROOT / "src"
-
-# numba compiles these: a wrapped function is none that it can read
-COMPILED = ("kernels",)
-
-
-def checked_modules() -> list[str]:
-    """Every module of the package whose shapes and types are checked while tests run (packages only re-export)."""
-    names = []
-    for path in sorted(SOURCES.rglob("*.py")):
-        compiled = path.stem in COMPILED or path.stem.endswith("_kernels")
-        if path.stem not in ("__init__", "__main__") and not compiled:
-            names.append(".".join(path.relative_to(SOURCES).with_suffix("").parts))
-    return names
-
 
 loaded = sorted(name for name in sys.modules if name.split(".")[0] == "stridecast")
 if loaded:

@@ -13,13 +13,37 @@ from pathlib import Path
 
 import pytest
 
-import conftest
 import stridecast
 from stridecast import errors
+from typechecks import SOURCES, checked_modules
 
 ROOT = Path(__file__).resolve().parent.parent
 
-PUBLIC: list[str] = []
+PUBLIC = [
+    "DatabaseError",
+    "DatabaseFileError",
+    "FileError",
+    "InputError",
+    "Motion",
+    "MotionDatabase",
+    "MotionError",
+    "Pose",
+    "Skeleton",
+    "SkeletonError",
+    "SteeringGains",
+    "StridecastError",
+    "TakeError",
+    "VehicleState",
+    "Walker",
+    "Walkers",
+    "WishError",
+    "build",
+    "load_database",
+    "load_motion",
+    "load_skeleton",
+    "save_database",
+    "write_bvh",
+]
 """Every public name. A change here is a change for users: say so in CHANGELOG.md."""
 
 MODULES = sorted(module.name for module in pkgutil.walk_packages(stridecast.__path__, "stridecast."))
@@ -65,10 +89,10 @@ def test_error_tree_is_as_drawn():
 
 def test_compiled_code_lives_in_kernel_modules():
     """What Numba compiles must not be wrapped by the type checks, which go by the names of modules."""
-    checked = set(conftest.checked_modules())
-    for path in conftest.SOURCES.rglob("*.py"):
+    checked = set(checked_modules())
+    for path in SOURCES.rglob("*.py"):
         if re.search(r"^@(numba\.)?n?jit", path.read_text(encoding="utf-8"), re.MULTILINE):
-            name = ".".join(path.relative_to(conftest.SOURCES).with_suffix("").parts)
+            name = ".".join(path.relative_to(SOURCES).with_suffix("").parts)
             assert name not in checked, f"{name} is compiled: call it kernels.py or ..._kernels.py"
 
 

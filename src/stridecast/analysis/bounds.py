@@ -81,8 +81,8 @@ def learn_transition(
 ) -> SteeringBounds:
     """Bounds of a transition: those at its two ends, each widened to the motion it joins there.
 
-    A transition has a few examples at most, so at each end everything they did counts, and so does what the motion it comes
-    from (or leads to) allows there: a walker who may begin it must be able to.
+    A transition has a few examples at most, so at each end everything they did counts, and so does what the motion it
+    comes from (or leads to) allows there: a walker who may begin it must be able to.
 
     Parameters
     ----------
@@ -111,6 +111,10 @@ def learn_transition(
             slow, fast = min(slow, side[0]), max(fast, side[1])
         tangential.append((min(low, 0.0), max(high, 0.0)))
         speed.append((slow, fast))
+    # Who begins faster than the examples ends faster by as much, where they speed up.
+    begun, ended = (max(float(s.speeds[end]) for s in segments) for end in (0, -1))
+    if ended > begun:
+        speed[1] = (speed[1][0], max(speed[1][1], ended + speed[0][1] - begun))
     neighbours = [n for n in (before, after) if n is not None]
     own = [float((np.abs(s.lateral) / np.maximum(s.speeds, SLOWEST)).max()) for s in segments]
     return SteeringBounds(
@@ -157,7 +161,7 @@ def _quantile(values: Float[Array, "samples"], weights: Float[Array, "samples"])
         return 0.0
     order = np.argsort(values)
     passed = np.cumsum(weights[order]) / weights.sum()
-    return float(values[order][min(np.searchsorted(passed, SHARE), len(values) - 1)])
+    return float(values[order][min(int(np.searchsorted(passed, SHARE)), len(values) - 1)])
 
 
 def _range(values: Sequence[float]) -> Interval:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -16,7 +17,7 @@ SHORTEST_STATE = 0.06
 """A state shorter than this between two equal states is a blip, seconds."""
 
 RUNNING_SPEED = 2.1
-"""Where a step from foot to foot shows neither double support nor flight, the walker's speed decides which it was, m/s."""
+"""A step from foot to foot that shows neither double support nor flight: the walker's speed decides, m/s."""
 
 SLOWEST_FLIGHT = 1.7
 """Nobody flies from step to step slower than this: such a gap between contacts is a double support missed, m/s ..."""
@@ -25,7 +26,7 @@ SHORTEST_FLIGHT = 0.06
 """... and up to running speed, so is a gap shorter than this, seconds."""
 
 LONGEST_BRUSH = 0.1
-"""Both feet on the floor for less than this while running is a step with no air under it, as in sharp turns, seconds."""
+"""Both feet on the floor for less than this in a run is a step with no air under it, as in sharp turns, seconds."""
 
 LONGEST = 1.7
 """A moving segment longer than this is no half cycle, seconds."""
@@ -162,8 +163,9 @@ def _merged(phases: list[Phase], letter: str) -> list[Phase]:
 def find_boundaries(phases: list[Phase], heights: Float[np.ndarray, "frames"], frames: int) -> list[Boundary]:
     """One boundary for each single support of walking and each flight of running, and the ends of each standing.
 
-    The place is the peak of the centre of mass's height inside the phase; the gait events guard it, so that a peak which
-    is none, or one that is missing, makes no false segment. A phase cut by the take counts if its peak can be seen.
+    The place is the peak of the centre of mass's height inside the phase; the gait events guard it, so that a peak
+    which is none, or one that is missing, makes no false segment. A phase cut by the take counts if its peak can be
+    seen.
     """
     found: list[Boundary] = []
     for i, p in enumerate(phases):
@@ -198,7 +200,7 @@ def _peak(heights: Float[np.ndarray, "frames"], phase: Phase) -> tuple[int, bool
 def cut_segments(phases: list[Phase], boundaries: list[Boundary], rate: float) -> list[Segment]:
     """Segments between neighbouring boundaries; longer ones than a half cycle can be are dropped."""
     out = []
-    for start, stop in zip(boundaries[:-1], boundaries[1:], strict=True):
+    for start, stop in pairwise(boundaries):
         inside = [p for p in phases if p.start <= stop.frame and p.stop > start.frame]
         if stop.frame <= start.frame or _is_pause(start, stop, inside, rate):
             continue
@@ -253,7 +255,7 @@ def label_motions(segments: Sequence[Segment], accelerations: Sequence[float]) -
         Mean tangential acceleration of the vehicle in each, m/s2.
     """
     labels = [s.motion for s in segments]
-    follows = [False] + [a.stop == b.start for a, b in zip(segments[:-1], segments[1:], strict=True)]
+    follows = [False] + [a.stop == b.start for a, b in pairwise(segments)]
     for first, through, last, whole, most in (
         (f"{STAND}-{WALK}", WALK, f"{WALK}-{RUN}", f"{STAND}-{RUN}", MAX_WALKED_THROUGH),
         (f"{RUN}-{WALK}", WALK, f"{WALK}-{STAND}", f"{RUN}-{STAND}", MAX_WALKED_THROUGH),

@@ -1,14 +1,17 @@
 """The vehicle trajectory of a take: where the person steers, once sway and surge of the steps are taken out (KS07).
 
 KS07 draws a spline through the pelvis at the mid-stances of the left foot, another for the right, and takes their mean.
-That covers a take from its second to its last but one step, which leaves little of a recording of two seconds. So a smooth
-vehicle and a phase-periodic detail are first fitted together to the whole take; the L- and R-trajectories are that fit seen
-from each foot's mid-stance, corrected so that they run exactly through the pelvis there. Their mean is the vehicle.
+That covers a take from its second to its last but one step, which leaves little of a recording of two seconds. So a
+smooth vehicle and a phase-periodic detail are first fitted together to the whole take; the L- and R-trajectories are
+that fit seen from each foot's mid-stance, corrected so that they run exactly through the pelvis there. Their mean is
+the vehicle.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -117,7 +120,7 @@ class _SplineBasis:
         knots = np.concatenate((np.zeros(DEGREE), np.linspace(0, end, pieces + 1), np.full(DEGREE, end)))
         times = np.arange(frames) / rate
         orders = [BSpline.design_matrix(times, knots, DEGREE)]
-        differences = eye_array(len(knots) - DEGREE - 1)
+        differences: Any = eye_array(len(knots) - DEGREE - 1)
         for order in range(1, 4):
             # The derivative of a spline is one of a degree less; its coefficients are scaled differences.
             degree = DEGREE - order + 1
@@ -138,7 +141,7 @@ class _SplineBasis:
 def _stride_time(mid_stances: tuple[MidStance, ...], standing: Bool[Array, "frames"], rate: float) -> float:
     """Seconds from a mid-stance to the next of the same foot, median; twice the step where each foot has but one."""
     steps = []
-    for before, after in zip(mid_stances[:-1], mid_stances[1:], strict=True):
+    for before, after in pairwise(mid_stances):
         if standing[int(before.frame) : int(after.frame) + 1].any():
             continue
         steps.append((after.frame - before.frame) / rate * (2 if before.side != after.side else 1))
@@ -152,7 +155,8 @@ def _stride_time(mid_stances: tuple[MidStance, ...], standing: Bool[Array, "fram
 
 def _phase(mid_stances: tuple[MidStance, ...], frames: int, stride: float) -> Float[Array, "frames"]:
     """Gait phase: a multiple of 2 pi at left mid-stance, pi more at right; evenly on beyond the ends."""
-    at, angle = [], []
+    at: list[float] = []
+    angle: list[float] = []
     for m in mid_stances:
         own = np.pi if m.side == RIGHT else 0.0
         if not angle:
@@ -203,8 +207,8 @@ def _fit(
     pelvis: Float[Array, "frames 2"],
     standing: Bool[Array, "frames"],
 ) -> tuple[Float[Array, "coefficients 2"], Float[Array, "terms"]]:
-    """Spline coefficients and detail amplitudes that explain the pelvis best, with little jerk and still where one stands."""
-    count, terms = basis.position.shape[1], detail.shape[-1]
+    """Spline coefficients and detail amplitudes that explain the pelvis best: little jerk, still while standing."""
+    terms = detail.shape[-1]
     turned = ground.turn(np.moveaxis(detail, 1, 2), headings[:, None])
     still = STILLNESS * basis.velocity[np.flatnonzero(standing)]
     # Normal equations: the spline's part is the same narrow band for x and z, joined by the few detail amplitudes.

@@ -13,7 +13,7 @@ from stridecast.model.skeleton import Skeleton
 
 
 class World(NamedTuple):
-    """Where joints are: ``positions`` (..., joints, 3) in metres and ``rotations`` (..., joints, 4) from joint to world."""
+    """Where joints are: ``positions`` (..., joints, 3), metres, and ``rotations`` (..., joints, 4), joint to world."""
 
     positions: np.ndarray
     rotations: np.ndarray

@@ -1,8 +1,9 @@
-"""Carry a motion from one skeleton to another: by role, rest poses aligned, root scaled by leg length, feet replanted."""
+"""Carry a motion to another skeleton: by role, rest poses aligned, root scaled by leg length, feet replanted."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -17,7 +18,7 @@ _NEXT_IN_LIMB = {
     f"{side}_{near}": f"{side}_{far}"
     for side in ("left", "right")
     for limb in (LEGS, ARMS)
-    for near, far in zip(limb[:-1], limb[1:], strict=True)
+    for near, far in pairwise(limb)
 }
 _NEXT_IN_TRUNK = {"spine": "chest", "spine1": "chest", "chest": "neck", "neck": "head"}
 
@@ -34,9 +35,9 @@ def same_skeleton(a: Skeleton, b: Skeleton) -> bool:
 def retarget(motion: Motion, skeleton: Skeleton) -> Motion:
     """Play ``motion`` on ``skeleton``.
 
-    Each joint with a role takes the world rotation of the joint with that role, corrected so that the bones point the same
-    way although the rest poses differ; other joints keep still in their parents' frames. Places are scaled by the ratio
-    of leg lengths; then the legs are bent so that toes stand where the scaled recording had them.
+    Each joint with a role takes the world rotation of the joint with that role, corrected so that the bones point the
+    same way although the rest poses differ; other joints keep still in their parents' frames. Places are scaled by the
+    ratio of leg lengths; then the legs are bent so that toes stand where the scaled recording had them.
 
     Parameters
     ----------
@@ -72,7 +73,7 @@ def retarget(motion: Motion, skeleton: Skeleton) -> Motion:
 def _world_rotations(
     skeleton: Skeleton, source: Skeleton, source_rotations: Float[np.ndarray, "frames _ 4"]
 ) -> Float[np.ndarray, "frames joints 4"]:
-    """World rotation of every joint of ``skeleton``; parents come before children, so each joint can follow its parent."""
+    """World rotation of every joint of ``skeleton``; parents come before children, so each can follow its parent."""
     out = np.empty((len(source_rotations), skeleton.joints, 4))
     role_of = {joint: role for role, joint in skeleton.roles.items()}
     for joint in range(skeleton.joints):
@@ -85,7 +86,7 @@ def _world_rotations(
 
 
 def _alignment(skeleton: Skeleton, source: Skeleton, role: str) -> Float[np.ndarray, "4"]:
-    """Rotation of the joint of ``skeleton`` that makes its bone point where the source's bone points in the rest pose."""
+    """Rotation of the joint of ``skeleton`` that makes its bone point where the source's does in the rest pose."""
     after = _NEXT_IN_LIMB.get(role) or _NEXT_IN_TRUNK.get(role)
     if after is None or after not in skeleton.roles or after not in source.roles:
         return quat.IDENTITY

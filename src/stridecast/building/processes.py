@@ -148,7 +148,7 @@ def _quiet_start() -> Iterator[None]:
 
 
 def _block_interrupts() -> set[int] | None:
-    """Let Ctrl-C wait, here and in processes that are started; return what waited before (none where that cannot be)."""
+    """Let Ctrl-C wait, here and in processes started; return what waited before (none where that cannot be)."""
     return signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if sys.platform != "win32" else None
 
 

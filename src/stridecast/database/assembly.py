@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -38,7 +39,7 @@ GENERIC = np.arange(-MARGIN, INTERVALS + MARGIN + 1) / INTERVALS
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AnalysedTake:
-    """A take with its analysis; ``mirrored`` says whether left and right were exchanged, ``take`` is its place in the list."""
+    """A take with its analysis; ``mirrored``: whether left and right are exchanged, ``take``: its place in the list."""
 
     analysis: TakeAnalysis
     take: int
@@ -164,10 +165,7 @@ def _pieces(segment: Segment, rate: float) -> list[Segment]:
         return [segment]
     count = max(1, round(segment.frames / rate / LONGEST_STAND))
     edges = np.linspace(segment.start.frame, segment.stop.frame, count + 1).round().astype(int)
-    return [
-        replace(segment, start=Boundary(int(a), "S"), stop=Boundary(int(b), "S"))
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
+    return [replace(segment, start=Boundary(int(a), "S"), stop=Boundary(int(b), "S")) for a, b in pairwise(edges)]
 
 
 def _group_order(name: str) -> tuple[int, str]:

@@ -73,7 +73,9 @@ def made_up(groups: Sequence[MotionGroup]) -> list[str]:
     missing = []
     for start in have:
         rows = [i for i, g in enumerate(groups) if g.motion == start]
-        for goal in have:
-            if goal != start and graph.steps[rows, MOTIONS.index(goal)].min() >= UNREACHABLE:
-                missing.append(f"{start}-{goal}")
+        missing += [
+            f"{start}-{goal}"
+            for goal in have
+            if goal != start and graph.steps[rows, MOTIONS.index(goal)].min() >= UNREACHABLE
+        ]
     return missing

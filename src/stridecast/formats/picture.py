@@ -164,7 +164,7 @@ def draw_body(
     seen_a, depth_a = camera.see(starts)
     seen_b, depth_b = camera.see(stops)
     order = np.argsort(-(depth_a + depth_b))
-    scale = axes.figure.get_figwidth() * 72 * 1.05  # points across a picture of width one at depth one
+    scale = axes.figure.figure.get_figwidth() * 72 * 1.05  # points across a picture of width one at depth one
     lines, widths, colours = [], [], []
     for k in order:
         joint = int(bones[k][0])

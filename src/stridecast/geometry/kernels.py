@@ -13,8 +13,8 @@ Quaternion = tuple[float, float, float, float]
 
 
 def kernel(function: Any) -> Any:
-    """Compile a kernel: cached on disk, free of the interpreter lock, numbers as in NumPy (no exceptions on division)."""
-    dispatcher = njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
+    """Compile a kernel: cached on disk, free of the interpreter lock, no exceptions on division (as in NumPy)."""
+    dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", fastmath=False)(function)
     # Numba looks at the kernel's own file only; a cached kernel would keep calling the old code of another file.
     dispatcher._cache._cache_file._source_stamp = _SOURCES
     return dispatcher
@@ -153,7 +153,7 @@ def between(a: Vector, b: Vector) -> Quaternion:
 
 @kernel
 def decay(offset: float, rate: float, half_life: float, dt: float) -> tuple[float, float]:
-    """A critically damped spring towards zero, exactly integrated over ``dt``: offset and its rate of change after it."""
+    """A critically damped spring towards zero, integrated exactly over ``dt``: offset and rate of change after it."""
     y = 2.0 * math.log(2.0) / half_life
     j = rate + offset * y
     e = math.exp(-y * dt)

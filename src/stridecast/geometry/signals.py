@@ -20,7 +20,7 @@ class Run(NamedTuple):
 
 
 def lowpass(signal: Float[Array, "frames *shape"], rate: float, cutoff: float) -> Float[Array, "frames *shape"]:
-    """Zero-phase Butterworth low-pass of second order; signals too short or too slow to filter come back as they are."""
+    """Zero-phase Butterworth low-pass of second order; signals too short or slow to filter come back as they are."""
     if cutoff >= 0.45 * rate or len(signal) < 8:
         return signal
     sections = butter(2, cutoff, fs=rate, output="sos")

@@ -18,7 +18,7 @@ INTERVALS = 24
 """Generic time of a segment is sampled at this many intervals, ..."""
 
 MARGIN = 2
-"""... and at this many more samples before its first and after its last frame, so that seams know where it comes from."""
+"""... and at this many more samples before its first and after its last frame, so that seams know whence it comes."""
 
 ROWS = INTERVALS + 1 + 2 * MARGIN
 """Samples of an example."""
@@ -75,7 +75,7 @@ class Examples:
     def __post_init__(self) -> None:
         count = len(self.durations)
         for name, kind in _TABLES.items():
-            array = np.ascontiguousarray(getattr(self, name), kind)
+            array: Array = np.ascontiguousarray(getattr(self, name), kind)
             if len(array) != count or not np.isfinite(array).all():
                 raise DatabaseError(f"table {name!r} is damaged: {count} finite rows wanted, shape {array.shape} found")
             array.setflags(write=False)

@@ -31,8 +31,8 @@ class Motion:
     Raises
     ------
     MotionError
-        Shapes that do not fit, no frames, a frame rate that is not positive, numbers that are not finite (the first such
-        frame and joint are named).
+        Shapes that do not fit, no frames, a frame rate that is not positive, numbers that are not finite (the first
+        such frame and joint are named).
     """
 
     skeleton: Skeleton

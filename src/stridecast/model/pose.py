@@ -65,8 +65,8 @@ class Pose:
     planted
         Which feet are held on the floor: left, right.
     motion, group
-        Coarse motion (``walk``, ``stand-walk``, ...) and group (``walk/LDR``) of the segment that plays; one name for a single
-        walker, a tuple for many.
+        Coarse motion (``walk``, ``stand-walk``, ...) and group (``walk/LDR``) of the segment that plays; one name for a
+        single walker, a tuple for many.
     clamped
         Names of the bounds that acted (``jerk``, ``tangential``, ``lateral``, ``speed``); likewise.
     bounds

@@ -1,4 +1,4 @@
-"""The vehicle: a person as an oriented particle on the floor (KS07 "Vehicle Model"), and what the pelvis does about it."""
+"""The vehicle: a person as an oriented particle on the floor (KS07 "Vehicle Model"), and the pelvis about it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Steering of one vehicle for one frame: from a wish to a lawful acceleration (KS07 "Force Extraction", "Clamping Outliers").
+"""Steering of one vehicle for one frame: from a wish to a lawful acceleration.
+
+KS07 "Force Extraction" and "Clamping Outliers".
 
 Everything here is written in the vehicle's frame: *tangential* along the direction of motion, *lateral* to its left.
 """
@@ -106,11 +108,11 @@ def limit(
 ) -> tuple[float, float, float, float, float, int]:
     """The acceleration nearest to a wish that keeps every bound (KS07 "Clamping Outliers").
 
-    KS07 clamps the change of acceleration, then its parts, then the speed, each undoing some of the one before. Here all
-    hold at once: bounds on the parts, tightened so far ahead that the bound on speed is met within the bound on jerk, are a
-    box; the last acceleration lies in it, so the way from there to the wish, cut to the box and to the jerk, does too.
-    Where it does not (the bounds have just changed), the bound that cannot be met in this frame moves as fast as the jerk
-    allows; ``in force`` is what then holds.
+    KS07 clamps the change of acceleration, then its parts, then the speed, each undoing some of the one before. Here
+    all hold at once: bounds on the parts, tightened so far ahead that the bound on speed is met within the bound on
+    jerk, are a box; the last acceleration lies in it, so the way from there to the wish, cut to the box and to the
+    jerk, does too. Where it does not (the bounds have just changed), the bound that cannot be met in this frame moves
+    as fast as the jerk allows; ``in force`` is what then holds.
 
     Parameters
     ----------
@@ -130,8 +132,8 @@ def limit(
     Returns
     -------
     tuple
-        Tangential and lateral acceleration, the least and greatest tangential and the greatest lateral one in force, and
-        the bits of the bounds that acted.
+        Tangential and lateral acceleration, the least and greatest tangential and the greatest lateral one in force,
+        and the bits of the bounds that acted.
     """
     reach = jerk * dt
     acted = 0
@@ -149,9 +151,12 @@ def limit(
         lowest = brake
     push = max((fastest - speed) / dt, low)
     if speed < fastest:
-        push = min(push, rising + unwinding(fastest - speed, later_jerk, dt))
+        # In a turn the force across comes round into the direction of motion; what that takes of the jerk cannot brake.
+        bent = max(turned, min(abs(had_l), wide))
+        spare = max(later_jerk - bent * bent / max(speed, 1e-6), 0.2 * later_jerk)
+        push = min(push, rising + unwinding(fastest - speed, spare, dt))
     if push - own < highest:
-        highest = push - own
+        highest = max(push - own, low)
     speed_low, speed_high = lowest > low, highest < high
     if lowest > highest:
         lowest = highest
@@ -164,12 +169,12 @@ def limit(
         acted |= SPEED if speed_high else TANGENTIAL
     # Slowing down narrows the bound on turning within the frame.
     wide = lateral_per_speed * max(min(speed, speed + t * dt), 0.0)
-    l = min(max(wish_l, -wide), wide)
-    if l != wish_l:
+    lateral = min(max(wish_l, -wide), wide)
+    if lateral != wish_l:
         acted |= LATERAL
 
     # 3. The way there, cut to the jerk.
-    far = math.hypot(t - had_t, l - had_l)
+    far = math.hypot(t - had_t, lateral - had_l)
     if far > reach:
         acted |= JERK
         inside_t = min(max(had_t, lowest), highest)
@@ -178,20 +183,20 @@ def limit(
         if back >= reach:
             # The box cannot be reached at once: go straight for it.
             t = had_t + (inside_t - had_t) * reach / back
-            l = had_l + (inside_l - had_l) * reach / back
+            lateral = had_l + (inside_l - had_l) * reach / back
         else:
             # The furthest point on the way from inside the box to the wish that the jerk allows.
-            dt_, dl_ = t - inside_t, l - inside_l
+            dt_, dl_ = t - inside_t, lateral - inside_l
             et, el = inside_t - had_t, inside_l - had_l
             qa = dt_ * dt_ + dl_ * dl_
             qb = et * dt_ + el * dl_
             qc = et * et + el * el - reach * reach
             share = (-qb + math.sqrt(max(qb * qb - qa * qc, 0.0))) / qa if qa > 0.0 else 0.0
             share = min(max(share, 0.0), 1.0)
-            t, l = inside_t + share * dt_, inside_l + share * dl_
+            t, lateral = inside_t + share * dt_, inside_l + share * dl_
         narrow = lateral_per_speed * max(min(speed, speed + t * dt), 0.0)
-        if abs(l) > narrow:
-            cut = narrow if l > 0.0 else -narrow
+        if abs(lateral) > narrow:
+            cut = narrow if lateral > 0.0 else -narrow
             if math.hypot(t - had_t, cut - had_l) <= reach:
-                l = cut
-    return t, l, min(lowest, t), max(highest, t), max(wide, abs(l)), acted
+                lateral = cut
+    return t, lateral, min(lowest, t), max(highest, t), max(wide, abs(lateral)), acted

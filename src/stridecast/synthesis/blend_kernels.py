@@ -31,7 +31,7 @@ def spline_weights(u: float) -> tuple[float, float, float, float]:
 def row_of(generic: float, rows: int) -> tuple[int, float]:
     """Sample at or before a generic time, and how far on from it."""
     at = MARGIN + generic * (rows - 1 - 2 * MARGIN)
-    i = min(max(int(math.floor(at)), 1), rows - 3)
+    i = min(max(math.floor(at), 1), rows - 3)
     return i, at - i
 
 

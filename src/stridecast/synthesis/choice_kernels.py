@@ -55,11 +55,12 @@ def next_group(tables: Tables, state: State, c: int, request: int) -> int:
         return first_group(tables, state, c, request)
     best, best_cost = -1, 1e18
     for h in range(len(tables.first)):
-        if not tables.follows[g, h] or tables.count[h] == 0:
+        if not tables.follows[g, h] or tables.sizes[h] == 0:
             continue
         steps = tables.steps[h, request]
         cost = 1e9 if steps >= UNREACHABLE else 10.0 * steps
-        # Stay with a transition that is under way, prefer one that is meant for this; begin nothing at a speed it does not know.
+        # Stay with a transition that is under way, prefer one that is meant for this; begin nothing at a speed it does
+        # not know.
         if tables.comes_from[h] != tables.leads_to[h]:
             if tables.leads_to[h] == request:
                 cost -= 2.0
@@ -98,7 +99,7 @@ def first_group(tables: Tables, state: State, c: int, request: int) -> int:
     """The group of a motion whose examples begin nearest to the present pose; of any motion if it has none."""
     best, best_cost = 0, 1e18
     for h in range(len(tables.first)):
-        if tables.count[h] == 0:
+        if tables.sizes[h] == 0:
             continue
         cost = nearest(tables, state, c, h)
         if tables.comes_from[h] != request or tables.leads_to[h] != request:
@@ -132,7 +133,7 @@ def distance(tables: Tables, state: State, c: int, e: int) -> float:
 def nearest(tables: Tables, state: State, c: int, h: int) -> float:
     """Smallest distance to any example of a group."""
     best = 1e18
-    for e in range(tables.first[h], tables.first[h] + tables.count[h]):
+    for e in range(tables.first[h], tables.first[h] + tables.sizes[h]):
         if tables.allowed[e]:
             best = min(best, distance(tables, state, c, e))
     return best
@@ -146,7 +147,7 @@ def blend_nearest(tables: Tables, state: State, c: int, h: int) -> None:
     """
     found = np.full(NEIGHBOURS + 1, 1e18)
     which = np.zeros(NEIGHBOURS + 1, np.int64)
-    for e in range(tables.first[h], tables.first[h] + tables.count[h]):
+    for e in range(tables.first[h], tables.first[h] + tables.sizes[h]):
         if not tables.allowed[e]:
             continue
         d = distance(tables, state, c, e) + 1e-9

@@ -1,7 +1,7 @@
 """Feet: a planted foot stays where it came down; the leg bends to it, as a hinge that only bends forward.
 
-A foot that comes to stand is caught, one that leaves is let go, both without a jump: what the toe shown differs from the toe
-meant fades (inertialization). A leg that cannot reach lets the heel rise first; then the pelvis sinks.
+A foot that comes to stand is caught, one that leaves is let go, both without a jump: what the toe shown differs from
+the toe meant fades (inertialization). A leg that cannot reach lets the heel rise first; then the pelvis sinks.
 """
 
 from __future__ import annotations
@@ -144,17 +144,14 @@ def toe_tip(tables, side):  # type: ignore[no-untyped-def]
 def stand_on_toes(tables, state, c, side, toe, tip, dt):  # type: ignore[no-untyped-def]
     """Where the toe joint of a held foot is: on the floor, or over the tips of the toes once they carry alone.
 
-    ``tip`` is the vector from the toe joint to the tip. While the foot lies flat the joint stays where it is held; when the
-    toes turn down, the tip stays and the joint moves up and over it.
+    ``tip`` is the vector from the toe joint to the tip. While the foot lies flat the joint stays where it is held; when
+    the toes turn down, the tip stays and the joint moves up and over it.
     """
     level, length = math.hypot(tip[0], tip[2]), norm(tip)
     over = 0.0 if level < 1e-9 or tip[1] > 0.0 else (length - level) / level
     floor = max(tables.sole, TIP - tip[1])
     height = min(state.hold[c, side, 1], max(toe[1], floor))
-    if height > floor:
-        height = floor + (height - floor) * 0.5 ** (dt / SETTLE_HALF_LIFE)
-    else:
-        height = floor
+    height = floor + (height - floor) * 0.5 ** (dt / SETTLE_HALF_LIFE) if height > floor else floor
     state.hold[c, side, 1] = height
     return (state.hold[c, side, 0] + over * tip[0], height, state.hold[c, side, 2] + over * tip[2])
 
@@ -194,7 +191,7 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
 
     if state.locked[c, side]:
         half_life = CATCH_HALF_LIFE
-        tip = rotate(foot_turn(tables, state, c, side, toes), toe_tip(tables, side))
+        tip = rotate(foot_turn(state, c, side, toes), toe_tip(tables, side))
         meant = stand_on_toes(tables, state, c, side, toe, tip, dt)
         q = (
             state.hold_turn[c, side, 0],
@@ -222,7 +219,7 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
 
 
 @kernel
-def foot_turn(tables, state, c, side, turned):  # type: ignore[no-untyped-def]
+def foot_turn(state, c, side, turned):  # type: ignore[no-untyped-def]
     """Rotation of the foot as shown: the blended one, turned about the vertical with what it was held by."""
     return multiply(about_y(state.twist[c, side]), turned)
 
@@ -231,7 +228,7 @@ def foot_turn(tables, state, c, side, turned):  # type: ignore[no-untyped-def]
 def raise_heel(tables, state, c, side, hip, turned):  # type: ignore[no-untyped-def]
     """Ankle and foot rotation for the toe shown; the heel rises about the toe as far as the leg is too short."""
     toe = (state.toe[c, side, 0], state.toe[c, side, 1], state.toe[c, side, 2])
-    turned = foot_turn(tables, state, c, side, turned)
+    turned = foot_turn(state, c, side, turned)
     sole = rotate(turned, offset_of(tables, tables.legs[side, 3]))
     ankle = subtract(toe, sole)
     length = tables.bones[side, 0] + tables.bones[side, 1]
@@ -305,7 +302,7 @@ def bend_leg(tables, state, c, side):  # type: ignore[no-untyped-def]
     set_quaternion(state.rotations, c, foot, normalize(multiply(inverse(multiply(whole, above_foot)), turned)))
     # The toes keep the direction they had before the heel rose.
     toe = tables.legs[side, 3]
-    flat = multiply(foot_turn(tables, state, c, side, foot_rotation), quaternion_at(state.rotations, c, toe))
+    flat = multiply(foot_turn(state, c, side, foot_rotation), quaternion_at(state.rotations, c, toe))
     set_quaternion(state.rotations, c, toe, normalize(multiply(inverse(turned), flat)))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +38,8 @@ class PointStream:
     Raises
     ------
     WishError
-        No sample, lengths that differ, numbers that are not finite, time that does not run forwards (the sample is named).
+        No sample, lengths that differ, numbers that are not finite, time that does not run forwards (the sample is
+        named).
     """
 
     times: Float[Array, "samples"]

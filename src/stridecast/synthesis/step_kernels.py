@@ -108,7 +108,7 @@ def motion_wanted(
     beta: float,
     c: int,
 ) -> int:
-    """The motion asked for; standing at first, once the point has been reached and rests, or while there is nowhere to go."""
+    """The motion asked for; standing at first, once the point is reached and rests, or while there is nowhere to go."""
     if motion == STAND or state.fresh[c]:
         return STAND
     standing = tables.leads_to[state.group[c]] == STAND
@@ -163,9 +163,9 @@ def next_segment_if_due(tables: Tables, state: State, c: int, request: int, dt: 
 def eased(state: State, c: int, x: float, z: float, k: float, brake: float, jerk: float) -> float:
     """By how much the spring's wished velocity ``(x, z)`` is scaled so that the vehicle can meet the point in time.
 
-    KS07's spring asks for a speed in proportion to the distance, also when the bounds forbid to lose that speed again before
-    the point is reached; the vehicle would swing to and fro. The distance that is more (or less) than an evenly moving
-    point keeps ahead may be made up only as fast as the bounds can take the difference in speed back.
+    KS07's spring asks for a speed in proportion to the distance, also when the bounds forbid to lose that speed again
+    before the point is reached; the vehicle would swing to and fro. The distance that is more (or less) than an evenly
+    moving point keeps ahead may be made up only as fast as the bounds can take the difference in speed back.
     """
     wish = math.hypot(x, z)
     if wish < 1e-6:
@@ -265,7 +265,7 @@ def move_vehicle(
 
     had_t = state.acceleration[c, 0] * sine + state.acceleration[c, 1] * cosine
     had_l = state.acceleration[c, 0] * cosine - state.acceleration[c, 1] * sine
-    t, l, least, most, widest, acted = limit(
+    t, lateral, least, most, widest, acted = limit(
         wish_t,
         wish_l,
         had_t,
@@ -282,7 +282,7 @@ def move_vehicle(
         tables.rising[g],
     )
 
-    ax, az = t * sine + l * cosine, t * cosine - l * sine
+    ax, az = t * sine + lateral * cosine, t * cosine - lateral * sine
     vx, vz = state.velocity[c, 0] + ax * dt, state.velocity[c, 1] + az * dt
     now = math.hypot(vx, vz)
     state.acceleration[c, 0], state.acceleration[c, 1] = ax, az

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool
 
+from stridecast.analysis.take import SOLE
 from stridecast.body import kinematics
 from stridecast.database.graph import UNREACHABLE, TransitionGraph, connect
 from stridecast.errors import DatabaseError
@@ -16,7 +17,6 @@ from stridecast.model.database import MARGIN, MotionDatabase
 from stridecast.model.group import MotionGroup
 from stridecast.model.segment import MOTIONS, RUN
 from stridecast.model.skeleton import Skeleton
-from stridecast.analysis.take import SOLE
 
 Array = np.ndarray
 
@@ -38,7 +38,7 @@ class Tables(NamedTuple):
     allowed: Array  # E, of the chosen subjects
     # groups
     first: Array  # G
-    count: Array  # G
+    sizes: Array  # G
     comes_from: Array  # G, index of a motion
     leads_to: Array  # G
     label: Array  # G, equal for groups of one coarse motion
@@ -93,7 +93,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         durations=examples.durations,
         allowed=allowed,
         first=np.array([g.first for g in groups]),
-        count=np.where(usable, [g.count for g in groups], 0),
+        sizes=np.where(usable, [g.count for g in groups], 0),
         comes_from=np.array([MOTIONS.index(g.comes_from) for g in groups]),
         leads_to=np.array([MOTIONS.index(g.leads_to) for g in groups]),
         label=np.array([labels.index(g.motion) for g in groups]),
@@ -136,8 +136,8 @@ def _allowed(database: MotionDatabase, subject: str | None) -> Bool[Array, "exam
 def _parameters(database: MotionDatabase) -> Array:
     """What examples are chosen by: speed at the first frame, and both accelerations as means over the whole segment.
 
-    KS07 takes the accelerations at the first frame too; but a half cycle in which a turn begins starts like a straight one, and
-    straight walking would be blended with it.
+    KS07 takes the accelerations at the first frame too; but a half cycle in which a turn begins starts like a straight
+    one, and straight walking would be blended with it.
     """
     examples = database.examples
     first, last = examples.travelled[:, MARGIN], examples.travelled[:, -1 - MARGIN]

@@ -96,7 +96,7 @@ class Walkers:
             for i, motion in enumerate(MOTIONS)
             if any(
                 group.motion == motion and count
-                for group, count in zip(database.groups, self._tables.count, strict=True)
+                for group, count in zip(database.groups, self._tables.sizes, strict=True)
             )
         }
         self._state = make_state(len(places), self._tables)
@@ -137,14 +137,14 @@ class Walkers:
         forces
             Instead of points: forces on a unit mass in the world, m/s2 (a joystick, sliders).
         motion
-            ``stand``, ``walk`` or ``run``, one for all or one each; carried out at the next segment the graph allows. Beside a
-            point that rests, a character comes to stand by itself.
+            ``stand``, ``walk`` or ``run``, one for all or one each; carried out at the next segment the graph allows.
+            Beside a point that rests, a character comes to stand by itself.
 
         Raises
         ------
         WishError
-            Not exactly one of points and forces, wrong shape, numbers that are not finite, an unknown motion. Nothing has
-            changed then.
+            Not exactly one of points and forces, wrong shape, numbers that are not finite, an unknown motion. Nothing
+            has changed then.
         """
         self._take_wish(points, forces, motion)
         self._advance()
@@ -291,7 +291,7 @@ class Walker:
         force: Sequence[float] | Float[Array, "2"] | None = None,
         motion: str = "walk",
     ) -> Pose:
-        """Advance by one frame towards a ground point ``(x, z)`` or by a force on a unit mass (m/s2); see ``Walkers.step``.
+        """Advance by one frame to a ground point ``(x, z)`` or by a force on a unit mass (m/s2); see ``Walkers.step``.
 
         Raises
         ------
