@@ -47,8 +47,8 @@ def any_bounds(draw) -> Bounds:
 def people(draw) -> Bounds:
     """Bounds that go together: the jerk is twice what the sharpest turn takes at the greatest speed or while braking.
 
-    In a turn at the rate ``w`` an acceleration ``a`` comes round by ``w a`` a second, and braking narrows what is allowed
-    across by as much again.
+    In a turn at the rate ``w`` an acceleration ``a`` comes round by ``w a`` a second, and braking narrows what is
+    allowed across by as much again.
     """
     free = draw(any_bounds())
     sharpest = min(math.sqrt(0.5 * free.jerk / free.fastest), 0.25 * free.jerk / max(free.high, -free.low))

@@ -133,16 +133,15 @@ def find_mid_stances(phases: list[Phase], frames: int) -> list[MidStance]:
     A support phase that the take cuts short counts when at least two thirds of it are there, judged by the median of
     the whole ones; its middle is taken from the end that can be seen.
     """
+    carried = [(p.start, p.stop, side) for side, letter in ((LEFT, "L"), (RIGHT, "R")) for p in _merged(phases, letter)]
+    whole = [b - a for a, b, _ in carried if a > 0 and b < frames]
+    usual = float(np.median(whole)) if whole else np.inf
     found: list[MidStance] = []
-    for side, letter in ((LEFT, "L"), (RIGHT, "R")):
-        carried = [(p.start, p.stop) for p in _merged(phases, letter)]
-        whole = [b - a for a, b in carried if a > 0 and b < frames]
-        usual = float(np.median(whole)) if whole else np.inf
-        for a, b in carried:
-            if a > 0 and b < frames:
-                found.append(MidStance((a + b - 1) / 2, side))
-            elif b - a >= usual * 2 / 3 and (a > 0 or b < frames):
-                found.append(MidStance(a + (usual - 1) / 2 if a > 0 else b - (usual + 1) / 2, side))
+    for a, b, side in carried:
+        if a > 0 and b < frames:
+            found.append(MidStance((a + b - 1) / 2, side))
+        elif b - a >= usual * 2 / 3 and (a > 0 or b < frames):
+            found.append(MidStance(a + (usual - 1) / 2 if a > 0 else b - (usual + 1) / 2, side))
     return sorted(m for m in found if 0 <= m.frame <= frames - 1)
 
 

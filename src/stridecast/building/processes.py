@@ -57,8 +57,9 @@ class Workers:
     def __enter__(self) -> Workers:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        # After Ctrl-C nobody waits; otherwise a pool left behind would complain when the interpreter ends.
+        self._close(wait=kind is None or issubclass(kind, Exception))
 
     def spread(
         self, function: Callable[[Task], Result], tasks: Sequence[Task]
@@ -109,9 +110,9 @@ class Workers:
             self._close()
         return sorted(lost)
 
-    def _close(self) -> None:
+    def _close(self, *, wait: bool = False) -> None:
         if self._pool is not None:
-            self._pool.shutdown(wait=False, cancel_futures=True)
+            self._pool.shutdown(wait=wait, cancel_futures=True)
             self._pool = None
 
 

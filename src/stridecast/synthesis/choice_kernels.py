@@ -120,13 +120,11 @@ def distance(tables: Tables, state: State, c: int, e: int) -> float:
     b = more / TANGENTIAL_SCALE
     d = (ax * cosine - az * sine - tables.parameters[e, 2]) / LATERAL_SCALE
     total = a * a + b * b + d * d
-    if not state.fresh[c]:
-        pose = 0.0
-        for k in range(tables.features.shape[2]):
-            gap = tables.features[e, MARGIN, k] - state.features[c, k]
-            pose += tables.feature_weights[k] * gap * gap
-        total += 3.0 * pose / (POSE_SCALE * POSE_SCALE)
-    return total
+    pose = 0.0
+    for k in range(tables.features.shape[2]):
+        gap = tables.features[e, MARGIN, k] - state.features[c, k]
+        pose += tables.feature_weights[k] * gap * gap
+    return total + 3.0 * pose / (POSE_SCALE * POSE_SCALE)
 
 
 @kernel

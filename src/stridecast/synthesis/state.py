@@ -38,7 +38,7 @@ class State(NamedTuple):
     segments: Array  # C, segments begun so far
     made_up: Array  # C, transitions that had no example
     # seams
-    features: Array  # C D, of the last frame as shown
+    features: Array  # C D, of the last frame as shown; at first the pose to begin with
     before: Array  # C D, of the frame before
     seam: Array  # C D, what is left of the difference at the last boundary
     seam_rate: Array  # C D
@@ -105,6 +105,7 @@ def make_state(count: int, tables: Tables) -> State:
     arrays |= {name: np.zeros((count, *shape), np.int64) for name, shape in whole.items()}
     arrays |= {name: np.zeros((count, *shape), bool) for name, shape in flags.items()}
     arrays["fresh"][:] = True
+    arrays["features"][:] = tables.neutral
     return State(**arrays)
 
 

@@ -15,7 +15,7 @@ from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import SIDES
 from stridecast.model.database import MARGIN, MotionDatabase
 from stridecast.model.group import MotionGroup
-from stridecast.model.segment import MOTIONS, RUN
+from stridecast.model.segment import MOTIONS, RUN, STAND
 from stridecast.model.skeleton import Skeleton
 
 Array = np.ndarray
@@ -55,6 +55,7 @@ class Tables(NamedTuple):
     rising: Array  # G, how fast the greatest speed goes on rising after the last frame
     approach: Array  # G 3 2, speeds at which what follows a group on the way to a motion can begin
     # pose
+    neutral: Array  # D, how people stand who are about to go or have just come
     references: Array  # J-1 4
     feature_weights: Array  # D
     parents: Array  # J
@@ -109,6 +110,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         speed=np.array([g.bounds.speed for g in groups]),
         rising=np.array([_rising(g) for g in groups]),
         approach=_approach(groups, entry, graph),
+        neutral=_neutral(database, allowed),
         references=database.references,
         feature_weights=_feature_weights(skeleton),
         parents=np.array(skeleton.parents),
@@ -193,6 +195,20 @@ def _approach(groups: tuple[MotionGroup, ...], entry: Array, graph: TransitionGr
             nearest = [k for k in reachable if graph.steps[k, m] == fewest]
             out[i, m] = entry[nearest, 0].min(), entry[nearest, 1].max() + (STOP_TOLERANCE if m == 0 else 0.0)
     return out
+
+
+def _neutral(database: MotionDatabase, allowed: Array) -> Array:
+    """Features to begin with: of those who start or stop; some of those who only stand do something else."""
+    features = database.examples.features
+    found = []
+    for group in database.groups:
+        own = features[group.rows][allowed[group.rows]]
+        if group.comes_from == STAND != group.leads_to:
+            found.append(own[:, MARGIN])
+        elif group.leads_to == STAND != group.comes_from:
+            found.append(own[:, -1 - MARGIN])
+    found = [f for f in found if len(f)] or [features[allowed][:, MARGIN]]
+    return np.concatenate(found).mean(axis=0)
 
 
 def _feature_weights(skeleton: Skeleton) -> Array:
