@@ -35,6 +35,23 @@ END_SHARE = 0.25
 """At each end of a transition, so much of the segment tells the bounds there."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class LeastAbility:
+    """What anybody can do: bounds no recording can fall below by showing too little (units as in ``SteeringBounds``)."""
+
+    jerk: float
+    tangential: float
+    lateral_per_speed: float
+
+
+LEAST = {
+    "stand": LeastAbility(jerk=3.0, tangential=0.5, lateral_per_speed=0.0),
+    "walk": LeastAbility(jerk=3.0, tangential=0.8, lateral_per_speed=1.0),
+    "run": LeastAbility(jerk=10.0, tangential=2.0, lateral_per_speed=1.0),
+}
+"""By motion. Most recordings go straight ahead at an even speed; a character who has seen no other could never turn."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SteeringSamples:
     """What the vehicle did in one segment, frame by frame: speed, both parts of the acceleration, and its change."""
@@ -45,8 +62,19 @@ class SteeringSamples:
     jerks: Float[Array, "frames"]
 
 
-def learn_cyclic(segments: Sequence[SteeringSamples], method: str = "balanced") -> SteeringBounds:
+def learn_cyclic(
+    segments: Sequence[SteeringSamples], method: str = "balanced", least: LeastAbility | None = None
+) -> SteeringBounds:
     """Bounds of a motion that repeats (walking, running, standing), the same at both ends.
+
+    Parameters
+    ----------
+    segments
+        What was recorded.
+    method
+        ``balanced`` or ``paper``.
+    least
+        What people can do at least, where the recordings show less; the bounds tell which of them were assumed so.
 
     Raises
     ------
@@ -63,11 +91,25 @@ def learn_cyclic(segments: Sequence[SteeringSamples], method: str = "balanced") 
     moving = speeds > SLOWEST
     turning = np.abs(lateral[moving]) / speeds[moving]
     middle, half = _tangential(speeds, tangential, method)
+    jerk = max(LEAST_JERK, *(float(s.jerks.max()) for s in segments))
+    across = _quantile(turning, _weights(speeds[moving], turning, SPEED_CELL, method))
+    low, high = middle - half, middle + half
+    assumed = []
+    if least is not None:
+        if jerk < least.jerk:
+            assumed.append("jerk")
+        if low > -least.tangential or high < least.tangential:
+            assumed.append("tangential")
+        if across < least.lateral_per_speed:
+            assumed.append("lateral_per_speed")
+        jerk, across = max(jerk, least.jerk), max(across, least.lateral_per_speed)
+        low, high = min(low, -least.tangential), max(high, least.tangential)
     return SteeringBounds(
-        jerk=max(LEAST_JERK, *(float(s.jerks.max()) for s in segments)),
-        tangential=((middle - half, middle + half),) * 2,
-        lateral_per_speed=_quantile(turning, _weights(speeds[moving], turning, SPEED_CELL, method)),
+        jerk=jerk,
+        tangential=((low, high),) * 2,
+        lateral_per_speed=across,
         speed=(_range([s.speeds[0] for s in segments]), _range([s.speeds[-1] for s in segments])),
+        assumed=tuple(assumed),
     )
 
 

@@ -48,6 +48,7 @@ def as_json(database: MotionDatabase) -> dict[str, object]:
                     "tangential": list(group.bounds.tangential_hull),
                     "lateral_per_speed": group.bounds.lateral_per_speed,
                     "speed": [list(pair) for pair in group.bounds.speed],
+                    "assumed": list(group.bounds.assumed),
                 },
             }
             for group in database.groups

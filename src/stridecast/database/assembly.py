@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from stridecast.analysis.bounds import SteeringSamples, learn_cyclic, learn_transition
+from stridecast.analysis.bounds import LEAST, SteeringSamples, learn_cyclic, learn_transition
 from stridecast.analysis.events import HARD
 from stridecast.analysis.take import TakeAnalysis
 from stridecast.errors import TakeError
@@ -198,7 +198,7 @@ def _learn_bounds(by_group: dict[str, list[tuple[AnalysedTake, Segment]]], metho
     pooled: dict[str, list[SteeringSamples]] = defaultdict(list)
     for name, own in samples.items():
         pooled[name.split("/")[0]] += own
-    cyclic = {motion: learn_cyclic(pooled[motion], method) for motion in MOTIONS if motion in pooled}
+    cyclic = {m: learn_cyclic(pooled[m], method, LEAST[m]) for m in MOTIONS if m in pooled}
     if STAND in cyclic:  # however still people stood, standing quite still is standing
         fastest = [high for _, high in cyclic[STAND].speed]
         cyclic[STAND] = replace(cyclic[STAND], speed=((0.0, fastest[0]), (0.0, fastest[1])))

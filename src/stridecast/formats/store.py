@@ -118,6 +118,7 @@ def _group(row: Mapping[str, Any]) -> MotionGroup:
     for name in ("tangential", "speed"):
         (a, b), (c, d) = bounds[name]
         bounds[name] = (float(a), float(b)), (float(c), float(d))
+    bounds["assumed"] = tuple(bounds.get("assumed", ()))
     return MotionGroup(**{**row, "keys": tuple(row["keys"]), "bounds": SteeringBounds(**bounds)})
 
 

@@ -23,12 +23,15 @@ class SteeringBounds:
         Greatest acceleration across it as a multiple of the speed, 1/s: the largest turning speed.
     speed
         Least and greatest speed, m/s, at the first and at the last frame.
+    assumed
+        Names of bounds that are no learned ones, as the recordings show too little: nobody in them turns, for instance.
     """
 
     jerk: float
     tangential: tuple[Interval, Interval]
     lateral_per_speed: float
     speed: tuple[Interval, Interval]
+    assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         for name, pair in (("tangential", self.tangential), ("speed", self.speed)):

@@ -139,6 +139,10 @@ class MotionDatabase:
         if not (np.isfinite(self.frame_rate) and 10 <= self.frame_rate <= 240):
             raise DatabaseError(f"the frame rate must lie between 10 and 240 Hz, not at {self.frame_rate}")
 
+    def __repr__(self) -> str:
+        sizes = f"{len(self.groups)} groups, {len(self.examples.durations)} examples, {len(self.takes)} takes"
+        return f"MotionDatabase({sizes}, {self.frame_rate:g} Hz)"
+
     @cached_property
     def by_name(self) -> dict[str, MotionGroup]:
         """Groups by name."""

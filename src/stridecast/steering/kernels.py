@@ -121,7 +121,7 @@ def limit(
     had_t, had_l
         Acceleration of the last frame, in the same frame of reference.
     speed
-        Speed before this frame, m/s; negative while a stop has gone a hair too far.
+        Speed before this frame, m/s.
     jerk, low, high, lateral_per_speed, slowest, fastest
         The bounds.
     later_jerk
@@ -199,4 +199,7 @@ def limit(
             cut = narrow if lateral > 0.0 else -narrow
             if math.hypot(t - had_t, cut - had_l) <= reach:
                 lateral = cut
+    if speed + t * dt < 0.0:
+        # Rather a jolt than a step backwards: only here the bound on jerk gives way.
+        t, lateral = -speed / dt, 0.0
     return t, lateral, min(lowest, t), max(highest, t), max(wide, abs(lateral)), acted

@@ -95,6 +95,8 @@ def show_features(state: State, c: int, meant: np.ndarray) -> None:
         inside = wrap(state.features[c, yaw])
         state.before[c, yaw] += inside - state.features[c, yaw]
         state.features[c, yaw] = inside
+    if state.fresh[c]:  # nobody knows where the first pose comes from: it is at rest
+        state.before[c] = state.features[c]
 
 
 @kernel

@@ -85,10 +85,10 @@ def misfit(tables: Tables, h: int, speed: float) -> float:
     """How far a speed lies outside those at which a group can begin, m/s; slower does for stops, faster for starts."""
     low, high = tables.entry_speed[h, 0], tables.entry_speed[h, 1]
     start, goal = tables.comes_from[h], tables.leads_to[h]
+    if start == 0:  # whoever has stopped stands, also where nobody was seen to stand so unquietly
+        return 0.0
     if start == goal:
         return max(low - speed - ENTRY_TOLERANCE, speed - high, 0.0)
-    if start == 0:
-        return 0.0
     if goal < start:
         return max(speed - high - (STOP_TOLERANCE if goal == 0 else ENTRY_TOLERANCE), 0.0)
     return max(low - speed - ENTRY_TOLERANCE, 0.0)

@@ -41,6 +41,9 @@ REACTION = 0.2
 WISH_TO_GO = 0.3
 """Slower than this nobody starts to walk, m/s; as a force: m/s2."""
 
+GOING = 0.4
+"""Below this speed a force says that one is to go, whatever its direction; above it may also brake, m/s."""
+
 WISH_TO_STOP = 0.55
 """A wished speed below this beside a point at rest is an arrival, m/s."""
 
@@ -221,8 +224,6 @@ def move_vehicle(
     u = min(state.generic[c], 1.0)
     sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
     speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
-    if state.velocity[c, 0] * sine + state.velocity[c, 1] * cosine < 0.0:
-        speed = -speed
 
     # The bounds of the group, linear from its first frame to its last; speed from what it was when the segment began.
     jerk, wide = tables.jerk[g], tables.lateral_per_speed[g]
@@ -235,8 +236,9 @@ def move_vehicle(
     if by_force[c] and request != STAND:
         wish_t = forces[c, 0] * sine + forces[c, 1] * cosine
         wish_l = forces[c, 0] * cosine - forces[c, 1] * sine
-        most = jerk * dt / (wide * dt) if wide > 0.0 else 0.0
-        wish_l = min(max(wish_l, -max(most, wide * speed)), max(most, wide * speed))
+        if speed < GOING:
+            # Nobody pushes off sideways or backwards: off ahead, and round from there.
+            wish_t = math.hypot(wish_t, wish_l)
     elif tables.leads_to[g] == STAND:
         # Coming to rest: at the end of the segment, with nothing left of the acceleration.
         if tables.comes_from[g] == STAND:
@@ -292,6 +294,7 @@ def move_vehicle(
     if now > 1e-3 and vx * sine + vz * cosine > 0.0:
         state.heading[c] = math.atan2(vx, vz)
     bounds = state.bounds[c]
-    bounds[0], bounds[1], bounds[2], bounds[3] = jerk, least, most, widest
+    bounds[0] = max(jerk, math.hypot(t - had_t, lateral - had_l) / dt)
+    bounds[1], bounds[2], bounds[3] = least, most, widest
     bounds[4], bounds[5] = min(slowest, now), max(fastest, now)
     state.acted[c] = acted
