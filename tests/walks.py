@@ -19,7 +19,7 @@ def points_of(kind: str, frames: int, rate: float, seed: int) -> np.ndarray:
     """A stream of ground points, as an input device may send it: ``(frames, 2)``."""
     rng = np.random.default_rng(seed)
     t = np.arange(frames)[:, None] / rate
-    facing, speed = rng.uniform(-np.pi, np.pi), rng.choice([0.4, 0.9, 1.3, 1.8, 3.0, 6.0])
+    facing, speed = rng.uniform(-np.pi, np.pi), rng.choice([0.41, 0.93, 1.31, 1.83, 3.03, 6.1])
     ahead = ground.direction(np.array([facing]))
     if kind == "still":
         return np.tile(rng.choice([0.0, 0.05, 1.0, 20.0]) * ahead, (frames, 1))

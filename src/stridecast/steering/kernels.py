@@ -17,6 +17,9 @@ JERK, TANGENTIAL, LATERAL, SPEED = 1, 2, 4, 8
 BEHIND = math.radians(100.0)
 """A wish further round than this asks for a reversal: the vehicle walks round instead of backing up."""
 
+STEADY = 0.8
+"""Share of the jerk bound that keeping up a turn may take; the rest is left for speeding up and braking in it."""
+
 UNWIND = 0.7
 """Share of the jerk bound that may be spent on each part of the acceleration while it is wound down in time."""
 
@@ -75,7 +78,8 @@ def pull(
     angle = math.atan2(lateral, tangential) if wish > 1e-9 else 0.0
     if abs(angle) > BEHIND:
         if side == 0.0:
-            side = 1.0 if angle > 0.0 else -1.0
+            # Straight behind there is no side: left then, whichever way rounding goes.
+            side = 1.0 if angle > 0.0 or abs(angle) > math.pi - 1e-6 else -1.0
         angle = side * BEHIND
     elif abs(angle) < 0.8 * BEHIND:
         side = 0.0
@@ -139,6 +143,8 @@ def limit(
     acted = 0
 
     # 1. The box. Turning alone adds a little speed each frame; that much is taken off what may be added.
+    # In a turn at the rate w the force across comes round by w2 v a second: no sharper than the jerk can keep up.
+    lateral_per_speed = min(lateral_per_speed, math.sqrt(STEADY * jerk / max(speed, 1e-3)))
     wide = lateral_per_speed * max(speed, 0.0)
     turned = min(abs(wish_l), wide)
     own = 0.5 * turned * turned * dt / max(speed, 1e-6) if speed > 1e-6 else 0.0

@@ -24,8 +24,11 @@ POSE_SCALE = 0.12
 ENTRY_TOLERANCE = 0.2
 """A transition can begin this far outside the speeds at which its examples began, m/s."""
 
-DETOUR = 2.0
-"""More segments than this are no way to another motion while a blend over nearest poses would do."""
+SPEED_TOLERANCE = 0.04
+"""Walking and running can begin this much above their speeds, m/s: a vehicle that slows down nears them ever more slowly."""
+
+TIE = 1e-7
+"""Left and right, mirrored, cost the same: the first is taken then, whichever way rounding goes."""
 
 
 @kernel
@@ -66,11 +69,13 @@ def next_group(tables: Tables, state: State, c: int, request: int) -> int:
                 cost -= 2.0
             if tables.label[h] == tables.label[g]:
                 cost -= 3.0
+            if tables.comes_from[h] == request:  # no way to what is asked for leads away from it
+                cost += 1e7
         off = misfit(tables, h, speed)
         if off > 0.0:
             cost += 1e6 + 1e4 * off
         cost += min(nearest(tables, state, c, h), 50.0) / 50.0
-        if cost < best_cost:
+        if cost < best_cost - TIE:
             best, best_cost = h, cost
     if best < 0 or (best_cost > 5e8 and tables.steps[g, request] >= UNREACHABLE):
         other = first_group(tables, state, c, request)
@@ -83,12 +88,12 @@ def next_group(tables: Tables, state: State, c: int, request: int) -> int:
 @kernel
 def misfit(tables: Tables, h: int, speed: float) -> float:
     """How far a speed lies outside those at which a group can begin, m/s; slower does for stops, faster for starts."""
+    if tables.from_rest[h]:  # whoever has stopped stands, also where nobody was seen to stand so unquietly
+        return 0.0
     low, high = tables.entry_speed[h, 0], tables.entry_speed[h, 1]
     start, goal = tables.comes_from[h], tables.leads_to[h]
-    if start == 0:  # whoever has stopped stands, also where nobody was seen to stand so unquietly
-        return 0.0
     if start == goal:
-        return max(low - speed - ENTRY_TOLERANCE, speed - high, 0.0)
+        return max(low - speed - ENTRY_TOLERANCE, speed - high - SPEED_TOLERANCE, 0.0)
     if goal < start:
         return max(speed - high - (STOP_TOLERANCE if goal == 0 else ENTRY_TOLERANCE), 0.0)
     return max(low - speed - ENTRY_TOLERANCE, 0.0)
@@ -104,7 +109,7 @@ def first_group(tables: Tables, state: State, c: int, request: int) -> int:
         cost = nearest(tables, state, c, h)
         if tables.comes_from[h] != request or tables.leads_to[h] != request:
             cost += 1e9
-        if cost < best_cost:
+        if cost < best_cost - TIE:
             best, best_cost = h, cost
     return best
 

@@ -171,10 +171,13 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
     if planted and not state.locked[c, side]:
         # Caught: it comes to rest a little ahead on its way.
         state.locked[c, side] = True
+        free_x, free_z = toe[0] + state.slip[c, side, 0], toe[2] + state.slip[c, side, 2]
+        level = math.hypot(free_x - shown[0], free_z - shown[2]) / dt
+        share = CATCH_WAY if level * CATCH_WAY <= CATCH_MOST else CATCH_MOST / level
         for k in range(3):
             free = toe[k] + state.slip[c, side, k]
             rate = (free - shown[k]) / dt
-            ahead = min(max(rate * CATCH_WAY, -CATCH_MOST), CATCH_MOST) if k != 1 else 0.0
+            ahead = rate * share if k != 1 else 0.0
             state.hold[c, side, k] = free + ahead
             state.slip[c, side, k] = -ahead
             state.slip_rate[c, side, k] = rate if k != 1 else state.slip_rate[c, side, k]

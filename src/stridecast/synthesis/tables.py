@@ -46,6 +46,7 @@ class Tables(NamedTuple):
     steps: Array  # G 3
     keys: Array  # G MOST_KEYS, padded with 2
     planted: Array  # G MOST_KEYS+1 2
+    from_rest: Array  # G, begins in standing
     entry_speed: Array  # G 2
     jerk: Array  # G
     later_jerk: Array  # G, of the motion a group leads to if that is less
@@ -102,6 +103,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         steps=graph.steps,
         keys=np.array([list(g.keys) + [2.0] * (MOST_KEYS - len(g.keys)) for g in groups]),
         planted=np.array([_planted(g.string) for g in groups]),
+        from_rest=np.array([g.start == "S" for g in groups]),
         entry_speed=entry,
         jerk=np.array([g.bounds.jerk for g in groups]),
         later_jerk=np.array([_later_jerk(g, groups) for g in groups]),
