@@ -37,7 +37,7 @@ END_SHARE = 0.25
 
 @dataclass(frozen=True, kw_only=True)
 class LeastAbility:
-    """What anybody can do: bounds no recording can fall below by showing too little (units as in ``SteeringBounds``)."""
+    """What anybody can do: no recording falls below it by showing too little (units as in ``SteeringBounds``)."""
 
     jerk: float
     tangential: float

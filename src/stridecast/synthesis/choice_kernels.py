@@ -25,7 +25,7 @@ ENTRY_TOLERANCE = 0.2
 """A transition can begin this far outside the speeds at which its examples began, m/s."""
 
 SPEED_TOLERANCE = 0.04
-"""Walking and running can begin this much above their speeds, m/s: a vehicle that slows down nears them ever more slowly."""
+"""Walking and running can begin this much above their speeds, m/s: who slows down nears them ever more slowly."""
 
 TIE = 1e-7
 """Left and right, mirrored, cost the same: the first is taken then, whichever way rounding goes."""
