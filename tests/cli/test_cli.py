@@ -218,7 +218,7 @@ def test_curves_and_paths_are_followed(database, tmp_path):
         lines.append(json.loads(result.stdout))
     assert lines[0] == lines[1]
     assert lines[0]["frame_rate"] == 60
-    assert 0.5 < lines[0]["metres"] < 2.5
+    assert 0.5 < lines[0]["metres"] < 3.2  # the point stops at once, a body does not
     assert lines[0]["output"] == str(out)
     assert lines[0]["trace"] is None
 

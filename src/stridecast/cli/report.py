@@ -48,7 +48,6 @@ def as_json(database: MotionDatabase) -> dict[str, object]:
                     "tangential": list(group.bounds.tangential_hull),
                     "lateral_per_speed": group.bounds.lateral_per_speed,
                     "speed": [list(pair) for pair in group.bounds.speed],
-                    "assumed": list(group.bounds.assumed),
                 },
             }
             for group in database.groups
@@ -59,6 +58,7 @@ def as_json(database: MotionDatabase) -> dict[str, object]:
         "turning_radius_at_1_3": _turning_radius(database),
         "subjects": list(database.subjects),
         "made_up": made_up(database.groups),
+        "assumed": {group.name: list(group.bounds.assumed) for group in database.groups if group.bounds.assumed},
         "coverage": {"speed": list(SPEEDS), "turn_deg_per_s": list(TURNS), "examples": grid.tolist()},
     }
 
