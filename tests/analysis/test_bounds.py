@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from stridecast.analysis.bounds import METHODS, SHARE, SLOWEST, SteeringSamples, learn_cyclic, learn_transition
+from stridecast.analysis.bounds import METHODS, SLOWEST, SteeringSamples, learn_cyclic, learn_transition
 from stridecast.analysis.take import analyse
 from stridecast.errors import InputError
 from stridecast.model.bounds import SteeringBounds
 from synthetic_gait import gait
 
 SEEDS = st.integers(0, 2**32 - 1)
+SHARE = 0.9  # KS07
 
 
 def samples(speeds, tangential, lateral, jerks=1.0) -> SteeringSamples:

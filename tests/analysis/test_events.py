@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stridecast.analysis.events import SHORTEST_STATE, find_gait, label_motions, support_phases
+from stridecast.analysis.events import find_gait, label_motions, support_phases
 from stridecast.analysis.take import analyse
 from stridecast.body.mirroring import mirror
 from stridecast.formats.recordings import load_motion
@@ -16,6 +16,8 @@ from stridecast.model.segment import Boundary, Segment
 from synthetic_gait import gait, ramps
 
 RATE = 60.0
+SHORTEST = 0.05
+"""A state shorter than this between two equal ones is none, seconds."""
 WALKING, RUNNING = st.floats(0.8, 1.8), st.floats(2.5, 4.0)
 CURVATURES, PHASES = st.floats(-0.5, 0.5), st.floats(0.0, 2 * np.pi)
 SUPPORTS = st.lists(st.tuples(st.sampled_from("SLRDF"), st.integers(1, 25)), min_size=1, max_size=25).map(
@@ -52,7 +54,7 @@ def test_no_blips_inside(support):
     phases = support_phases(support, np.full(len(support), 1.2), RATE)
     for before, here, after in zip(phases[:-2], phases[1:-1], phases[2:], strict=True):
         if before.state == after.state and here.state != "S":
-            assert here.stop - here.start >= SHORTEST_STATE * RATE
+            assert here.stop - here.start >= SHORTEST * RATE
 
 
 @given(SUPPORTS, st.floats(0.0, 5.0))
