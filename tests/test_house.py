@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PUBLIC = [
     "DatabaseError",
     "DatabaseFileError",
+    "DownloadError",
     "FileError",
     "InputError",
     "Motion",
@@ -41,6 +42,7 @@ PUBLIC = [
     "load_database",
     "load_motion",
     "load_skeleton",
+    "sample_database",
     "save_database",
     "write_bvh",
 ]

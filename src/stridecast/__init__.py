@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from stridecast.errors import (
         DatabaseError,
         DatabaseFileError,
+        DownloadError,
         FileError,
         InputError,
         MotionError,
@@ -33,11 +34,13 @@ if TYPE_CHECKING:
     from stridecast.model.motion import Motion
     from stridecast.model.pose import Pose, VehicleState
     from stridecast.model.skeleton import Skeleton
+    from stridecast.samples.library import sample_database
     from stridecast.steering.force import SteeringGains
     from stridecast.synthesis.walker import Walker, Walkers
 
 _HOME = {
     "build": "building.build",
+    "sample_database": "samples.library",
     "load_database": "formats.store",
     "save_database": "formats.store",
     "load_motion": "formats.recordings",
@@ -53,6 +56,7 @@ _HOME = {
     "Walkers": "synthesis.walker",
     "DatabaseError": "errors",
     "DatabaseFileError": "errors",
+    "DownloadError": "errors",
     "FileError": "errors",
     "InputError": "errors",
     "MotionError": "errors",
@@ -65,6 +69,7 @@ _HOME = {
 __version__ = "0.1.0"
 __all__ = [  # noqa: RUF022
     "build",
+    "sample_database",
     "load_database",
     "save_database",
     "load_motion",
@@ -80,6 +85,7 @@ __all__ = [  # noqa: RUF022
     "Walkers",
     "DatabaseError",
     "DatabaseFileError",
+    "DownloadError",
     "FileError",
     "InputError",
     "MotionError",

@@ -10,6 +10,7 @@
         ├── MotionError              a motion that no person made (broken numbers, jumps)
         ├── TakeError                a take that cannot be learned from, with the reason
         ├── DatabaseError            a request that the database cannot answer
+        ├── DownloadError            a file on the web that does not come, with its address
         └── WishError                a point, force or motion name the walker rejects; its state is untouched
 
 Messages say what was wrong, where, and what would be right.
@@ -64,6 +65,10 @@ class TakeError(InputError):
 
 class DatabaseError(InputError):
     """A request that the motion database cannot answer."""
+
+
+class DownloadError(InputError):
+    """A file on the web that does not come, or comes with another content."""
 
 
 class WishError(InputError):

@@ -56,7 +56,7 @@ def test_every_stance_is_found_once_at_any_frame_rate(speed, curvature, rate):
             assert all(sum(a < d and c < b for c, d in others) == 1 for a, b in inside)
 
 
-@given(st.floats(0.9, 1.6), st.floats(0.55, 1.3))
+@given(st.floats(0.9, 1.45), st.floats(0.55, 1.3))
 @settings(max_examples=10)
 def test_thresholds_follow_the_size_of_the_body(speed, size):
     """Short legs walk slower by the square root of their length (Froude)."""

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from stridecast.building.cache import TakeCache, code_hash, key_of
+from stridecast.building.cache import LAYERS, TakeCache, code_hash, key_of
 
 TENSORS = {"a": np.arange(1000.0)}
 
@@ -31,6 +31,27 @@ def test_names_depend_on_every_part_and_on_the_code(monkeypatch):
     assert key_of(file="a", rate=30.0) not in keys
 
 
+def test_the_hash_tells_of_code_and_of_the_tables_beside_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("stridecast.building.cache.resources.files", lambda _: tmp_path)
+    for layer in (*LAYERS, "samples", "cli"):
+        (tmp_path / layer / "__pycache__").mkdir(parents=True)
+        (tmp_path / layer / "code.py").write_text("old")
+    plain, more = code_hash.__wrapped__(), code_hash.__wrapped__("samples")
+    assert plain != more
+    for name in ("cli/code.py", "model/__pycache__/code.pyc", "samples/.code.py.swp"):
+        (tmp_path / name).write_text("new")
+        assert code_hash.__wrapped__("samples") == more
+    seen = {plain, more}
+    for name in ("samples/code.py", "samples/table.npz", "samples/deeper/table.csv"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("new")
+        assert code_hash.__wrapped__() == plain
+        seen.add(code_hash.__wrapped__("samples"))
+    assert len(seen) == 5
+    (tmp_path / "analysis" / "code.py").write_text("new")
+    assert code_hash.__wrapped__() not in seen
+
+
 def test_a_damaged_entry_is_thrown_away(cache, caplog):
     caplog.set_level("INFO")
     cache.put("key", {}, TENSORS)
@@ -49,6 +70,19 @@ def test_a_folder_that_cannot_be_written_is_done_without(tmp_path, caplog):
     assert cache.get("key") is None
     cache.trim()
     assert "not remembered" in caplog.text
+
+
+def test_a_folder_that_may_not_be_looked_into_is_done_without(cache, monkeypatch, caplog):
+    caplog.set_level("INFO")
+
+    def forbidden(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    for name in ("is_file", "unlink", "iterdir"):
+        monkeypatch.setattr(f"pathlib.Path.{name}", forbidden)
+    assert cache.get("key") is None
+    cache.trim()
+    assert "not remembered for the next build" in caplog.text
 
 
 def test_a_full_disk_stops_no_build(cache, monkeypatch, caplog):

@@ -26,7 +26,7 @@ def sliding(motion: Motion, planted: np.ndarray) -> float:
 def analysed(mocap, request) -> TakeAnalysis:
     path = mocap / "cmu" / f"{request.param}.amc"
     body = read(ReadTask(path=mocap / "cmu" / "35" / "35_01.amc", reading=Reading())).skeleton
-    task = AnalysisTask(path=path, reading=Reading(), motion=None, skeleton=body, mirror=False)
+    task = AnalysisTask(motion=ReadTask(path=path, reading=Reading()), skeleton=body, mirror=False)
     return understand(task).analysis
 
 

@@ -19,6 +19,9 @@ SHORTEST_STATE = 0.06
 RUNNING_SPEED = 2.1
 """A step from foot to foot that shows neither double support nor flight: the walker's speed decides, m/s."""
 
+FASTEST_WALK = 2.6
+"""Nobody walks faster, m/s."""
+
 SLOWEST_FLIGHT = 1.7
 """Nobody flies from step to step slower than this: such a gap between contacts is a double support missed, m/s ..."""
 
@@ -65,7 +68,7 @@ def find_gait(
     rate
         Frames a second.
     """
-    phases = support_phases(contacts.support(), speeds, rate)
+    phases = support_phases(contacts.support(), speeds, rate, heights)
     boundaries = find_boundaries(phases, heights, len(heights))
     return Gait(
         phases=tuple(phases),
@@ -75,11 +78,17 @@ def find_gait(
     )
 
 
-def support_phases(support: str, speeds: Float[np.ndarray, "frames"], rate: float) -> list[Phase]:
+def support_phases(
+    support: str,
+    speeds: Float[np.ndarray, "frames"],
+    rate: float,
+    heights: Float[np.ndarray, "frames"] | None = None,
+) -> list[Phase]:
     """Support states as phases that a gait can have.
 
     Blips between equal states go; double support next to standing is standing; a step from foot to foot with nothing in
-    between gets one frame of double support or flight.
+    between gets one frame of double support or flight. Contacts are hard to find where one foot follows close upon the
+    other: between walking and running there the bounce of the body decides, and its speed where heights are not known.
     """
     letters = np.array(list(support))
     # Double support and flight back to back: the shorter is noise. Then blips, shortest first.
@@ -91,10 +100,10 @@ def support_phases(support: str, speeds: Float[np.ndarray, "frames"], rate: floa
         i = min(bad)[1]
         letters[phases[i].start : phases[i].stop] = _replacement(phases, i)
     for i, here in enumerate(phases):
-        running = speeds[here.start] > RUNNING_SPEED
+        running = _is_running(phases, i, speeds, heights)
         if i and {phases[i - 1].state, here.state} == {"L", "R"}:
             letters[here.start] = "F" if running else "D"
-        elif here.state == "F" and _is_missed_double(here, float(speeds[here.start]), rate, len(letters)):
+        elif here.state == "F" and _is_missed_double(here, float(speeds[here.start]), running, rate, len(letters)):
             letters[here.start : here.stop] = "D"
         elif here.state == "D" and running and here.stop - here.start < LONGEST_BRUSH * rate:
             letters[here.start : here.stop] = "F"
@@ -115,11 +124,29 @@ def _is_noise(phases: list[Phase], i: int, rate: float) -> bool:
     return here.state in "DF" and before.state in "DF"
 
 
-def _is_missed_double(flight: Phase, speed: float, rate: float, frames: int) -> bool:
+def _is_running(
+    phases: list[Phase], i: int, speeds: Float[np.ndarray, "frames"], heights: Float[np.ndarray, "frames"] | None
+) -> bool:
+    """Whether a change from foot to foot is one of running: a runner's body is high then, a walker's low."""
+    here = phases[i]
+    speed = speeds[here.start]
+    if heights is None or not SLOWEST_FLIGHT < speed < FASTEST_WALK:
+        return bool(speed > RUNNING_SPEED)
+    alone = here.state in ("L", "R")  # no state between the feet: they change at its first frame
+    around = (phases[i - 1] if i else here, here if alone else phases[min(i + 1, len(phases) - 1)])
+    whole = [p for p in around if p.state in ("L", "R") and p.start > 0 and p.stop < len(heights)]
+    if not whole or (here.start == 0 and not alone) or here.stop == len(heights):
+        return bool(speed > RUNNING_SPEED)
+    middle = here.start if alone else (here.start + here.stop - 1) // 2
+    carried = [heights[(p.start + p.stop - 1) // 2] for p in whole]
+    return bool(heights[middle] > np.mean(carried))
+
+
+def _is_missed_double(flight: Phase, speed: float, running: bool, rate: float, frames: int) -> bool:
     """Whether a gap between contacts is none; one cut by the end of the take is not believed below running speed."""
     seen = flight.start > 0 and flight.stop < frames
     short = flight.stop - flight.start < SHORTEST_FLIGHT * rate
-    return speed < SLOWEST_FLIGHT or (speed < RUNNING_SPEED and (short or not seen))
+    return speed < SLOWEST_FLIGHT or (not running and (short or not seen))
 
 
 def _replacement(phases: list[Phase], i: int) -> str:

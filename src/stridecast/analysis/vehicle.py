@@ -27,7 +27,7 @@ from stridecast.model.vehicle import VehicleTrajectory
 
 Array = np.ndarray
 
-CUTOFF = 0.8
+CUTOFF = 1.0
 """What is slower than this many times the stride frequency is steering, what is faster is detail of the steps."""
 
 DEGREE = 5

@@ -118,7 +118,7 @@ def to_motion(
     motion = _with_root_offset(motion, recording.offsets[0] * unit, axis, notes)
     motion = _turned(motion, quat.between(axis, _UP))
     motion = _rested(motion, _rest_turn(motion.skeleton, notes))
-    _check_speed(motion, before, frames - motion.frames)
+    check_speed(motion, before, frames - motion.frames)
     return motion, tuple(notes)
 
 
@@ -328,7 +328,21 @@ def _rested(motion: Motion, turn: Float[np.ndarray, "4"]) -> Motion:
     return replace(motion, skeleton=_skeleton_rested(motion.skeleton, turn), rotations=rotations)
 
 
-def _check_speed(motion: Motion, before: str, dropped: int) -> None:
+def check_speed(motion: Motion, before: str = "", dropped: int = 0) -> None:
+    """Refuse a root that moves as no person's does.
+
+    Parameters
+    ----------
+    motion
+        In metres.
+    before, dropped
+        What the message begins with, and how many frames of the recording come before the first of the motion.
+
+    Raises
+    ------
+    MotionError
+        It is faster than ``LARGEST_SPEED``; the frame is named.
+    """
     speeds = np.linalg.norm(np.diff(motion.root_positions, axis=0), axis=-1) * motion.frame_rate
     fast = np.flatnonzero(speeds > LARGEST_SPEED)
     if len(fast):

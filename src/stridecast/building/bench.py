@@ -30,8 +30,8 @@ class Bench:
     progress: Progress | None
 
     def tell(self, stage: str, done: int, total: int) -> None:
-        """Tell how far a stage is."""
-        if self.progress is not None:
+        """Tell how far a stage is, if there is anything to do in it."""
+        if self.progress is not None and total:
             self.progress(stage, done, total)
 
     def do(

@@ -16,16 +16,26 @@ from stridecast.analysis.bounds import METHODS
 from stridecast.building import entries
 from stridecast.building.bench import Bench, Progress
 from stridecast.building.cache import TakeCache, key_of
-from stridecast.building.processes import Failure, Workers
+from stridecast.building.processes import Failure, Workers, attempt
 from stridecast.building.selection import body_of_most_seconds, said_twice
-from stridecast.building.sources import Source, collect
-from stridecast.building.stages import AnalysisTask, Reading, ReadTask, Recording, Understood, read, understand
+from stridecast.building.sources import FileSource, MotionSource, Source, collect
+from stridecast.building.stages import (
+    AnalysisTask,
+    Reading,
+    ReadTask,
+    Recording,
+    Understood,
+    read,
+    take_up,
+    understand,
+)
 from stridecast.database.assembly import AnalysedTake, assemble
 from stridecast.errors import InputError, TakeError
 from stridecast.formats.recordings import load_skeleton
 from stridecast.formats.store import as_stored
 from stridecast.formats.tensors import pack_skeleton
 from stridecast.model.database import MotionDatabase, Take
+from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
 
 Result = TypeVar("Result")
@@ -38,7 +48,7 @@ REASONS_SHOWN = 5
 
 
 def build(
-    sources: str | Path | Iterable[str | Path],
+    sources: str | Path | Motion | Iterable[str | Path | Motion],
     *,
     skeleton: Skeleton | str | Path | None = None,
     frame_rate: float = 30.0,
@@ -56,7 +66,8 @@ def build(
     Parameters
     ----------
     sources
-        Files and folders (searched to the bottom): BVH, and AMC with its ASF.
+        Files and folders (searched to the bottom): BVH, and AMC with its ASF. Motions in memory go the same way; in the
+        database and in messages their names stand in place of a file.
     skeleton
         Body that all motion is carried over to: a skeleton, or a BVH or ASF file. Left out: the body of the person with
         the most seconds.
@@ -69,13 +80,14 @@ def build(
     jobs
         Processes at work, one a core if left out; 1 works in this process. The result does not depend on it.
     roles, scale
-        As of ``load_motion``, for all files.
+        As of ``load_motion``, for all files; a motion in memory is as it is.
     input_rate
         Frames a second of files that do not say (AMC), 120 if left out.
     cache
         Remember what was found out about each take, so that the next build is faster.
     progress
-        Called with a stage of ``STAGES``, how much of it is done, and how much there is.
+        Called with a stage of ``STAGES``, how much of it is done, and how much there is; not for a stage with nothing
+        to do.
 
     Returns
     -------
@@ -94,21 +106,23 @@ def build(
     _check_options(frame_rate, bounds, jobs, scale, input_rate)
     body = _load_body(skeleton, roles, scale)
     reading = Reading(roles=None if roles is None else dict(roles), scale=scale, input_rate=input_rate)
-    files = collect([sources] if isinstance(sources, str | Path) else sources)
+    offered = collect([sources] if isinstance(sources, str | Path | Motion) else sources)
     with Workers(jobs or os.cpu_count() or 1) as workers:
         bench = Bench(workers=workers, cache=TakeCache.of_user() if cache else TakeCache(None), progress=progress)
-        recordings, left_out = _parted(_read_all(bench, files, reading))
-        left_out |= said_twice(files, recordings)
+        recordings, left_out = _parted(_read_all(bench, offered, reading))
+        left_out |= said_twice(offered, recordings)
         used = {i: recording for i, recording in recordings.items() if i not in left_out}
         body = body or (body_of_most_seconds(list(used.values())) if used else None)
         if body is None:
-            raise TakeError(_nothing(files, left_out))
-        understood, refused = _parted(_understand_all(bench, files, used, reading, body, mirror))
+            raise TakeError(_nothing(offered, left_out))
+        understood, refused = _parted(_understand_all(bench, offered, used, reading, body, mirror))
         left_out |= refused
         if not understood:
-            raise TakeError(_nothing(files, left_out))
+            raise TakeError(_nothing(offered, left_out))
     bench.tell("assemble", 0, 1)
-    takes = [_account(file, recordings.get(i), understood.get(i), left_out.get(i)) for i, file in enumerate(files)]
+    takes = [
+        _account(source, recordings.get(i), understood.get(i), left_out.get(i)) for i, source in enumerate(offered)
+    ]
     with threadpool_limits(1):
         database = assemble(_both(understood), takes, frame_rate=float(frame_rate), bounds_method=bounds)
     bench.cache.trim()
@@ -140,17 +154,19 @@ def _load_body(
     return body
 
 
-def _read_all(bench: Bench, files: Sequence[Source], reading: Reading) -> dict[int, Recording | Failure]:
-    """Read every file."""
+def _read_all(bench: Bench, sources: Sequence[Source], reading: Reading) -> dict[int, Recording | Failure]:
+    """Read every file, and take up the motions in memory, which come after them."""
+    files = [source for source in sources if isinstance(source, FileSource)]
     tasks = [ReadTask(path=file.path, reading=reading) for file in files]
     keys = [_key("read", file, reading) for file in files]
     results = bench.do("read", read, tasks, keys, entries.pack_recording, entries.unpack_recording)
+    results += [attempt(take_up, source.motion) for source in sources if isinstance(source, MotionSource)]
     return dict(enumerate(results))
 
 
 def _understand_all(
     bench: Bench,
-    files: Sequence[Source],
+    sources: Sequence[Source],
     used: Mapping[int, Recording],
     reading: Reading,
     body: Skeleton,
@@ -158,12 +174,12 @@ def _understand_all(
 ) -> dict[int, Understood | Failure]:
     """Analyse every take that is used on the database's body, and its mirror image."""
     tasks = [
-        AnalysisTask(path=files[i].path, reading=reading, motion=recording.motion, skeleton=body, mirror=mirror)
+        AnalysisTask(motion=_motion_of(sources[i], recording, reading), skeleton=body, mirror=mirror)
         for i, recording in used.items()
     ]
     header, arrays = pack_skeleton(body)
     shape = json.dumps([header, {name: array.tolist() for name, array in arrays.items()}], sort_keys=True)
-    keys = [_key("analyse", files[i], reading, body=shape, mirror=mirror) for i in used]
+    keys = [_key("analyse", sources[i], reading, body=shape, mirror=mirror) for i in used]
     results = bench.do(
         "analyse",
         understand,
@@ -175,11 +191,18 @@ def _understand_all(
     return dict(zip(used, results, strict=True))
 
 
-def _key(stage: str, file: Source, reading: Reading, **more: object) -> str:
-    """Name under which a result is remembered; file and folder tell format, name and person, so they are part of it."""
+def _motion_of(source: Source, recording: Recording, reading: Reading) -> Motion | ReadTask:
+    """Find the motion of a take, or how to read it."""
+    if isinstance(source, MotionSource):
+        return source.motion
+    return recording.motion or ReadTask(path=source.path, reading=reading)
+
+
+def _key(stage: str, source: Source, reading: Reading, **more: object) -> str:
+    """Name under which a result is remembered."""
     options = {"roles": reading.roles, "scale": reading.scale, "input_rate": reading.input_rate}
-    place = list(file.path.absolute().parts[-2:])
-    return key_of(stage=stage, sha256=file.sha256, companions=file.companions, place=place, **options, **more)
+    told = {"sha256": source.sha256, "companions": source.companions, "place": source.place}
+    return key_of(stage=stage, **told, **options, **more)
 
 
 def _parted(results: Mapping[int, Result | Failure]) -> tuple[dict[int, Result], dict[int, str]]:
@@ -198,16 +221,16 @@ def _both(understood: Mapping[int, Understood]) -> list[AnalysedTake]:
     return out
 
 
-def _account(file: Source, recording: Recording | None, understood: Understood | None, reason: str | None) -> Take:
-    """Say what became of a file; how many segments were used is filled in by ``assemble``."""
+def _account(source: Source, recording: Recording | None, understood: Understood | None, reason: str | None) -> Take:
+    """Say what became of a take; how many segments were used is filled in by ``assemble``."""
     covered = 0.0
     if understood is not None:
         covered = (len(understood.analysis.vehicle.positions) - 1) / understood.analysis.motion.frame_rate
     return Take(
-        name=recording.name if recording else file.path.stem,
+        name=recording.name if recording else source.name,
         subject=recording.subject if recording else "",
-        file=file.shown,
-        sha256=file.sha256,
+        file=source.shown,
+        sha256=source.sha256,
         seconds=recording.seconds if recording else 0.0,
         covered=covered,
         segments=0,
@@ -216,7 +239,7 @@ def _account(file: Source, recording: Recording | None, understood: Understood |
     )
 
 
-def _nothing(files: Sequence[Source], left_out: Mapping[int, str]) -> str:
-    reasons = [f"{files[i].shown}: {reason}" for i, reason in sorted(left_out.items())]
+def _nothing(sources: Sequence[Source], left_out: Mapping[int, str]) -> str:
+    reasons = [f"{sources[i].shown}: {reason}" for i, reason in sorted(left_out.items())]
     more = [f"and {len(reasons) - REASONS_SHOWN} more"] if len(reasons) > REASONS_SHOWN else []
     return "\n  ".join(["no take could be used:", *reasons[:REASONS_SHOWN], *more])

@@ -9,9 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,9 @@ FORMAT = "stridecast take"
 VERSION = 1
 MOST_BYTES = 1 << 30
 """What the folder may hold."""
+
+LAYERS = ("geometry", "model", "body", "analysis", "formats", "building")
+"""What a take's analysis depends on beside the take."""
 
 log = logging.getLogger("stridecast")
 
@@ -50,14 +54,16 @@ class TakeCache:
     @classmethod
     def of_user(cls) -> TakeCache:
         """Open the cache in the user's cache folder."""
-        return cls(Path(platformdirs.user_cache_dir("stridecast", appauthor=False)) / "takes")
+        return cls(user_folder() / "takes")
 
     def get(self, key: str) -> Entry | None:
         """Find an entry, or none; a damaged one is thrown away."""
         path = self._path(key)
-        if path is None or not path.is_file():
+        if path is None:
             return None
         try:
+            if not path.is_file():
+                return None
             entry = read_tensors(path, FORMAT, VERSION)
             path.touch()
         except (InputError, OSError) as error:
@@ -108,6 +114,11 @@ class TakeCache:
         log.info("takes are not remembered for the next build: %s", error)
 
 
+def user_folder() -> Path:
+    """Folder of the package among the user's caches, for what can be made again; it may not be there yet."""
+    return Path(platformdirs.user_cache_dir("stridecast", appauthor=False))
+
+
 def key_of(**parts: object) -> str:
     """Name an entry by a hash of what it depends on (plain values that JSON can say) and of the code."""
     text = json.dumps({"code": code_hash(), **parts}, sort_keys=True)
@@ -115,12 +126,22 @@ def key_of(**parts: object) -> str:
 
 
 @cache
-def code_hash() -> str:
-    """Hash the code: everything that a take's analysis depends on beside the take."""
+def code_hash(*more: str) -> str:
+    """Hash the code of ``LAYERS`` and of more layers, with the tables that lie beside it."""
     digest = hashlib.sha256(f"numpy {np.__version__} scipy {scipy.__version__}".encode())
     package = resources.files("stridecast")
-    for layer in ("geometry", "model", "body", "analysis", "formats", "building"):
-        files = [file for file in package.joinpath(layer).iterdir() if file.name.endswith(".py")]
-        for file in sorted(files, key=lambda file: file.name):
-            digest.update(f"{layer}/{file.name}\n".encode() + file.read_bytes())
+    for layer in (*LAYERS, *more):
+        for name, file in _files(package.joinpath(layer), layer):
+            digest.update(f"{name}\n".encode() + file.read_bytes())
     return digest.hexdigest()
+
+
+def _files(folder: Traversable, name: str) -> Iterator[tuple[str, Traversable]]:
+    """Find the files in a folder of the package (to its bottom) with their names, all but what Python leaves there."""
+    for item in sorted(folder.iterdir(), key=lambda item: item.name):
+        if item.name.startswith((".", "__pycache__")):
+            continue
+        if item.is_dir():
+            yield from _files(item, f"{name}/{item.name}")
+        else:
+            yield f"{name}/{item.name}", item

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from stridecast.building.sources import Source
 from stridecast.building.stages import Recording
@@ -14,38 +15,38 @@ SAME_TAKE = 4
 """Two files whose frame counts differ by at most this can hold the same take: a T-pose added, a frame lost."""
 
 
-def said_twice(files: Sequence[Source], recordings: Mapping[int, Recording]) -> dict[int, str]:
-    """Find takes that stand in two files: copies, and BVH files of a take whose AMC is there too.
+def said_twice(sources: Sequence[Source], recordings: Mapping[int, Recording]) -> dict[int, str]:
+    """Find takes that are there twice: copies, and BVH files of a take whose AMC is there too.
 
     Parameters
     ----------
-    files
-        All files.
+    sources
+        All files and motions.
     recordings
         Those that could be read, by their place in the list.
 
     Returns
     -------
-    Why a file is left out, by its place in the list. An AMC comes with the complete skeleton, so its BVH goes.
+    Why a take is left out, by its place in the list. An AMC comes with the complete skeleton, so its BVH goes.
     """
     out: dict[int, str] = {}
     first: dict[tuple[str, str], int] = {}
     complete: dict[tuple[str, str], int] = {}
     for i, recording in recordings.items():
-        original = first.setdefault((files[i].sha256, files[i].companions), i)
+        original = first.setdefault((sources[i].sha256, sources[i].companions), i)
         if original != i:
-            out[i] = f"a copy of {files[original].shown}"
-        elif files[i].path.suffix.lower() == ".amc":
+            out[i] = f"a copy of {sources[original].shown}"
+        elif sources[i].suffix == ".amc":
             complete.setdefault(_take(recording), i)
     for i, recording in recordings.items():
         twin = complete.get(_take(recording), i)
         if (
             i not in out
-            and files[i].path.suffix.lower() == ".bvh"
+            and sources[i].suffix == ".bvh"
             and abs(recordings[twin].frames - recording.frames) <= SAME_TAKE
             and twin != i
         ):
-            out[i] = f"the same take as {files[twin].path.name}, which comes with the complete skeleton"
+            out[i] = f"the same take as {Path(sources[twin].shown).name}, which comes with the complete skeleton"
     return out
 
 

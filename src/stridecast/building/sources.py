@@ -1,20 +1,23 @@
-"""Which files a build is made of: named files, and the recordings in named folders."""
+"""What a build is made of: named files, the recordings in named folders, and motions in memory."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
 from stridecast.errors import FileError, InputError
 from stridecast.formats.recordings import RECORDINGS
+from stridecast.formats.tensors import pack_skeleton
+from stridecast.model.motion import Motion
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class FileSource:
     """A file to learn from.
 
     Parameters
@@ -32,6 +35,21 @@ class Source:
     companions: str = ""
 
     @property
+    def name(self) -> str:
+        """What its take is called where it cannot be read."""
+        return self.path.stem
+
+    @property
+    def suffix(self) -> str:
+        """What its format is known by, in lower case."""
+        return self.path.suffix.lower()
+
+    @property
+    def place(self) -> tuple[str, ...]:
+        """What results depend on beside the content: file and folder tell format, name and person."""
+        return self.path.absolute().parts[-2:]
+
+    @property
     def shown(self) -> str:
         """The path as users and databases are told: relative where it lies below the working folder."""
         try:
@@ -40,8 +58,48 @@ class Source:
             return self.path.as_posix()
 
 
-def collect(sources: Iterable[str | Path]) -> list[Source]:
+@dataclass(frozen=True, kw_only=True)
+class MotionSource:
+    """A motion in memory to learn from; what a ``FileSource`` tells, it tells as well.
+
+    Parameters
+    ----------
+    motion
+        The motion, with a name.
+    sha256
+        Hash of what is moved and how, by whatever name.
+    """
+
+    motion: Motion
+    sha256: str
+    companions: str = ""
+    suffix: str = ""
+
+    @property
+    def name(self) -> str:
+        """What its take is called."""
+        return self.motion.name
+
+    @property
+    def place(self) -> tuple[str, ...]:
+        """What results depend on beside the content."""
+        return self.motion.name, self.motion.subject, self.motion.source
+
+    @property
+    def shown(self) -> str:
+        """What users and databases are told in place of a path: the name."""
+        return self.motion.name
+
+
+Source = FileSource | MotionSource
+"""What a build learns from."""
+
+
+def collect(sources: Iterable[str | Path | Motion]) -> list[Source]:
     """Find every recording in files and folders (searched to the bottom), each once, in the order of their paths.
+
+    Motions in memory come after them, in the order in which they are given; one that has no name is called after its
+    place among them, as "motion 0".
 
     Raises
     ------
@@ -49,21 +107,25 @@ def collect(sources: Iterable[str | Path]) -> list[Source]:
         Nothing is named, a path does not exist or cannot be read, or a folder holds no recording.
     """
     found: dict[Path, Path] = {}
-    nothing = True
-    for place in map(Path, sources):
-        nothing = False
+    motions: list[Motion] = []
+    for source in sources:
+        if isinstance(source, Motion):
+            motions.append(source if source.name else replace(source, name=f"motion {len(motions)}"))
+            continue
+        place = Path(source)
         try:
             for path in _recordings_in(place):
                 found.setdefault(path.resolve(), path)
         except OSError as error:
             raise FileError(f"cannot be read: {error.strerror or error}", path=place) from error
-    if nothing:
+    if not (found or motions):
         raise InputError(f"name at least one recording or folder of recordings ({_readable()})")
     companions = cache(_skeletons_beside)
-    return [
-        Source(path=path, sha256=_sha256(path), companions=companions(path.parent) if _is_amc(path) else "")
+    files = [
+        FileSource(path=path, sha256=_sha256(path), companions=companions(path.parent) if _is_amc(path) else "")
         for path in sorted(found.values())
     ]
+    return [*files, *(MotionSource(motion=motion, sha256=_sha256_of(motion)) for motion in motions)]
 
 
 def _is_amc(path: Path) -> bool:
@@ -96,6 +158,15 @@ def _sha256(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError:
         return ""  # whoever reads the file will say what is wrong
+
+
+def _sha256_of(motion: Motion) -> str:
+    header, arrays = pack_skeleton(motion.skeleton)
+    told = json.dumps([header, float(motion.frame_rate), motion.frames], sort_keys=True)
+    digest = hashlib.sha256(told.encode())
+    for array in (*arrays.values(), motion.root_positions, motion.rotations):
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def _skeletons_beside(folder: Path) -> str:

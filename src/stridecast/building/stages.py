@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from stridecast.analysis.take import TakeAnalysis, analyse
+from stridecast.body.conventions import check_speed
 from stridecast.body.mirroring import mirror_planted
 from stridecast.errors import FileError, InputError, TakeError
 from stridecast.formats.recordings import load_recording
@@ -51,11 +52,9 @@ class ReadTask:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class AnalysisTask:
-    """What ``understand`` is to do; without ``motion`` the file is read again."""
+    """What ``understand`` is to do; a motion that is not at hand is read (again)."""
 
-    path: Path
-    reading: Reading
-    motion: Motion | None
+    motion: Motion | ReadTask
     skeleton: Skeleton
     mirror: bool
 
@@ -71,10 +70,27 @@ class Understood:
 
 def read(task: ReadTask) -> Recording:
     """Read a recording; errors are those of ``load_recording``, without the path in front."""
+    return _recorded(*_load(task))
+
+
+def take_up(motion: Motion) -> Recording:
+    """Treat a motion in memory as one that was read.
+
+    Raises
+    ------
+    SkeletonError, MotionError
+        It lacks joints of the legs; its root moves as no person's does.
+    """
+    motion.skeleton.require_roles()
+    check_speed(motion)
+    return _recorded(motion, ())
+
+
+def _load(task: ReadTask) -> tuple[Motion, tuple[str, ...]]:
     reading = task.reading
     says_rate = task.path.suffix.lower() == ".bvh"
     try:
-        motion, notes = load_recording(
+        return load_recording(
             task.path,
             roles=reading.roles,
             scale=reading.scale,
@@ -82,6 +98,9 @@ def read(task: ReadTask) -> Recording:
         )
     except InputError as error:
         raise TakeError(_without_path(error, task.path)) from error
+
+
+def _recorded(motion: Motion, notes: tuple[str, ...]) -> Recording:
     return Recording(
         name=motion.name,
         subject=motion.subject,
@@ -95,8 +114,8 @@ def read(task: ReadTask) -> Recording:
 
 def understand(task: AnalysisTask) -> Understood:
     """Analyse a take on the database's skeleton, and its mirror image; errors are those of ``analyse``."""
-    motion = task.motion or read(ReadTask(path=task.path, reading=task.reading)).motion
-    analysis = analyse(motion, task.skeleton)  # type: ignore[arg-type]
+    motion = _load(task.motion)[0] if isinstance(task.motion, ReadTask) else task.motion
+    analysis = analyse(motion, task.skeleton)
     if not task.mirror:
         return Understood(analysis=analysis, mirrored=None)
     try:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from stridecast.cli import build, show, walk
+from stridecast.cli import build, fetch, samples, show, walk
 from stridecast.errors import InputError
 
 
@@ -33,6 +33,8 @@ app = typer.Typer(
 app.command("build")(build.build)
 app.command("show")(show.show)
 app.command("walk")(walk.walk)
+app.command("samples")(samples.samples)
+app.command("fetch")(fetch.fetch)
 
 
 def _version(wanted: bool) -> bool:

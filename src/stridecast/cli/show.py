@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from stridecast.cli.databases import Database, open_database
+
 
 def show(
-    database: Annotated[Path, typer.Argument(metavar="DB", help="A motion database.", show_default=False)],
+    database: Database = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON.")] = False,
 ) -> None:
     """Show what a motion database has learned: groups, bounds, coverage, people, and what was left out."""
     from stridecast.cli import report, screen
-    from stridecast.formats.store import load_database
 
-    content = load_database(database)
+    content = open_database(database)
     if as_json:
         screen.print_json(report.as_json(content))
     else:

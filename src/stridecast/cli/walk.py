@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from stridecast.cli.databases import Database, open_database
+
 if TYPE_CHECKING:
     from stridecast.synthesis.journey import Journey, PointStream
 
@@ -17,10 +19,10 @@ OUTPUTS = (".bvh",)
 
 
 def walk(
-    database: Annotated[Path, typer.Argument(metavar="DB", help="A motion database.", show_default=False)],
     output: Annotated[
         Path, typer.Option("--output", "-o", metavar="OUT.bvh", help="The motion to write.", show_default=False)
     ],
+    database: Database = None,
     points: Annotated[
         Path | None, typer.Option("--input", metavar="POINTS.csv", help="Samples to follow: time,x,z[,motion].")
     ] = None,
@@ -67,7 +69,6 @@ def walk(
     from stridecast.cli import screen
     from stridecast.formats.bvh import write_bvh
     from stridecast.formats.files import check_place, replacing
-    from stridecast.formats.store import load_database
     from stridecast.formats.trace import trace_text
     from stridecast.steering.force import SteeringGains
     from stridecast.synthesis.journey import follow
@@ -85,7 +86,7 @@ def walk(
         }
     )
     stream = _stream(points, curve, path, motion, SPEEDS[motion] if speed is None else speed)
-    learned = load_database(database)
+    learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {"walk": f"{motion}ing" if motion != "run" else "running"}) as progress:
         journey = follow(
             learned,
