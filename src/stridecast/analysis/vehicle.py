@@ -27,7 +27,7 @@ from stridecast.model.vehicle import VehicleTrajectory
 
 Array = np.ndarray
 
-CUTOFF = 1.0
+CUTOFF = 0.9
 """What is slower than this many times the stride frequency is steering, what is faster is detail of the steps."""
 
 DEGREE = 5
@@ -41,6 +41,9 @@ HEADING_SPEED = 0.25
 
 STILLNESS = 0.3
 """Weight of standing still against lying on the pelvis, seconds: the vehicle rests while the pelvis sways."""
+
+USUAL_STRIDE = 1.1
+"""Where nobody strides twice, that is what a stride would take, seconds."""
 
 LONGEST_STRIDE = 3.2
 """Nobody strides slower, seconds."""
@@ -148,8 +151,8 @@ def _stride_time(mid_stances: tuple[MidStance, ...], standing: Bool[Array, "fram
     steps = [s for s in steps if s < LONGEST_STRIDE]
     if steps:
         return float(np.median(steps))
-    if standing.mean() > 0.5:
-        return 1.0
+    if standing.any():  # a start or a stop, with no room for more
+        return USUAL_STRIDE
     raise TakeError("no two steps follow each other in it, so its rhythm cannot be found")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from stridecast.samples.corpus import SampleTake
+    from stridecast.samples.performance import SampleTake
 
 
 def samples(

@@ -64,6 +64,14 @@ def adult() -> Skeleton:
     )
 
 
+def standing_height(bend: float = np.radians(9)) -> float:
+    """Height of the root over the floor when both feet are flat under the hips and the knees bent, metres."""
+    at = dict(zip(adult().names, adult().offsets, strict=True))
+    upper, lower = -at["LeftLeg"][1], -at["LeftFoot"][1]
+    leg = np.sqrt(upper**2 + lower**2 + 2 * upper * lower * np.cos(bend))
+    return float(leg - at["LeftUpLeg"][1] - at["LeftToeBase"][1] + SOLE)
+
+
 def roll_over(pitches: Float[np.ndarray, "frames"], ball: Float[np.ndarray, "3"]) -> Float[np.ndarray, "frames 3"]:
     """Ankle of a foot on the floor that faces +Z, seen from the point below its ball when flat.
 

@@ -17,6 +17,9 @@ Array = np.ndarray
 RATE = 60.0
 """Frames a second of the sample takes."""
 
+CHANGES = (2.1, 1.95)
+"""Who slows down walks below the first speed, who speeds up runs above the second, m/s."""
+
 ENTERING = 0.7
 """A circle is entered and left within this time, seconds."""
 
@@ -64,11 +67,12 @@ class Recipe:
             frames = round(leg.seconds * rate)
             u = (np.arange(frames) + 0.5) / frames
             goal = speed if leg.speed is None else leg.speed
+            changes = leg.running is not None and leg.running != run
             run = run if leg.running is None else leg.running
             speeds.append(speed + (goal - speed) * _ease(u))
             edge = np.minimum(u, 1 - u) * leg.seconds / ENTERING
             turns.append(leg.turn / leg.seconds * _ease_rate(u) + leg.rate * _ease(np.minimum(edge, 1.0)))
-            running.append(np.full(frames, run))
+            running.append(speeds[-1] > CHANGES[int(run)] if changes else np.full(frames, run))
             speed = goal
         return np.concatenate(speeds), np.concatenate(turns), np.concatenate(running)
 
@@ -120,9 +124,7 @@ def _walking(style: str, prefix: str = "") -> list[Recipe]:
     return [
         Recipe(name=f"{prefix}walk_faster", speed=0.6, legs=(Leg(seconds=20.0, speed=2.0),), style=style),
         Recipe(name=f"{prefix}walk_turns", speed=1.3, legs=(*_bends(RIGHT_ANGLE, 1.6, 2.4),), style=style),
-        Recipe(
-            name=f"{prefix}walk_start_stop", legs=(*_from_rest(1.3, 1.3, 1.4, (2.0, 2.6, 2.3)),), style=style
-        ),
+        Recipe(name=f"{prefix}walk_start_stop", legs=(*_from_rest(1.3, 1.9, 2.2, (1.0, 1.6, 1.3)),), style=style),
     ]
 
 
@@ -135,13 +137,13 @@ RECIPES: tuple[Recipe, ...] = (
         for name, speed, seconds in (("slow", 0.9, 2.6), ("usual", 1.3, 2.2), ("fast", 1.7, 2.0))
     ),
     Recipe(name="walk_turns_slow", speed=0.85, legs=(*_bends(RIGHT_ANGLE, 2.4, 2.0),)),
-    Recipe(name="walk_turns_fast", speed=1.6, legs=(*_bends(RIGHT_ANGLE, 1.7, 1.2, 1.4, 1.7),)),
+    Recipe(name="walk_turns_fast", speed=1.6, legs=(*_bends(RIGHT_ANGLE, 1.8, 1.2, 1.4, 1.6),)),
     Recipe(name="walk_about", speed=1.2, legs=(*_bends(ABOUT, 2.4, 0.9, 0.9, 1.2),)),
     Recipe(name="walk_circles", speed=1.2, legs=(Leg(seconds=10.0, rate=0.55), Leg(seconds=10.0, rate=-0.55))),
     Recipe(name="walk_small_circles", speed=1.0, legs=(Leg(seconds=10.0, rate=1.0), Leg(seconds=10.0, rate=-1.0))),
-    Recipe(name="walk_changes", speed=0.8, legs=(*_back_and_forth(0.8, 1.7, 1.5, 1.6),)),
-    Recipe(name="walk_start_stop_slow", legs=(*_from_rest(0.8, 1.1, 1.2, (2.4, 2.9, 2.6)),)),
-    Recipe(name="walk_start_stop_fast", legs=(*_from_rest(1.7, 1.6, 1.7, (2.0, 2.5, 2.2)),)),
+    Recipe(name="walk_changes", speed=0.8, legs=(*_back_and_forth(0.8, 1.7, 1.8, 1.4),)),
+    Recipe(name="walk_start_stop_slow", legs=(*_from_rest(0.8, 1.4, 1.7, (1.8, 2.3, 2.0)),)),
+    Recipe(name="walk_start_stop_fast", legs=(*_from_rest(1.7, 2.5, 2.8, (0.5, 1.0, 0.7)),)),
     Recipe(
         name="walk_start_stop_turning",
         legs=tuple(
@@ -149,9 +151,9 @@ RECIPES: tuple[Recipe, ...] = (
             for side in (1, -1, 1)
             for leg in (
                 Leg(seconds=1.2),
-                Leg(seconds=1.3, speed=1.2, turn=side * 0.5),
-                Leg(seconds=2.4, turn=side * 0.7),
-                Leg(seconds=1.4, speed=0.0, turn=-side * 0.4),
+                Leg(seconds=1.7, speed=1.2, turn=side * 0.5),
+                Leg(seconds=2.0, turn=side * 0.7),
+                Leg(seconds=1.8, speed=0.0, turn=-side * 0.4),
             )
         ),
     ),
@@ -161,9 +163,11 @@ RECIPES: tuple[Recipe, ...] = (
     Recipe(name="run_veer_fast", speed=3.8, running=True, legs=(*_bends(np.radians(30), 1.9, 1.6),)),
     Recipe(name="run_turns", speed=2.5, running=True, legs=(*_bends(RIGHT_ANGLE, 1.7, 2.2),)),
     Recipe(name="run_turns_fast", speed=3.4, running=True, legs=(*_bends(RIGHT_ANGLE, 2.0, 1.0, 2.8, 3.4),)),
-    Recipe(name="run_circles", speed=3.0, running=True, legs=(Leg(seconds=10.0, rate=0.7), Leg(seconds=10.0, rate=-0.7))),
+    Recipe(
+        name="run_circles", speed=3.0, running=True, legs=(Leg(seconds=10.0, rate=0.7), Leg(seconds=10.0, rate=-0.7))
+    ),
     Recipe(name="run_changes", speed=2.3, running=True, legs=(*_back_and_forth(2.3, 4.2, 1.6, 1.4),)),
-    Recipe(name="walk_run", speed=1.4, legs=(*_back_and_forth(1.4, 3.1, 1.2, 1.7, run=True),)),
+    Recipe(name="walk_run", speed=1.4, legs=(*_back_and_forth(1.4, 3.5, 1.1, 1.7, run=True),)),
     Recipe(name="walk_jog", speed=1.7, legs=(*_back_and_forth(1.7, 2.5, 0.9, 2.0, run=True),)),
     Recipe(name="run_start_stop", legs=(*_from_rest(3.0, 1.6, 1.6, (1.6, 2.1, 1.8), running=True),)),
     Recipe(name="run_start_stop_fast", legs=(*_from_rest(3.8, 2.0, 2.0, (1.5, 1.9), running=True),)),

@@ -1,7 +1,7 @@
 """A statistical model of human gait: what joints and pelvis do at a phase, a speed, a turn and an acceleration.
 
-Each channel of the body is a Fourier series in gait phase whose coefficients depend on speed, turn and acceleration. One
-table holds walking, one running; standing is a posture.
+Each channel of the body is a Fourier series in gait phase whose coefficients depend on speed, turn, acceleration and
+hurry. One table holds walking, one running; standing is a posture.
 """
 
 from __future__ import annotations

@@ -124,8 +124,8 @@ def _learn(progress: Progress | None) -> MotionDatabase:
             progress("make", done, total)
 
     motions = [take.motion for take in sample_takes(progress=tell) if take.style in STYLES]
-    # The takes show both sides, and an analysis is over before a process would have started.
-    return build(motions, mirror=False, cache=False, jobs=1, progress=progress)
+    # An analysis is over before a process would have started.
+    return build(motions, cache=False, jobs=1, progress=progress)
 
 
 def _remove_all_but(path: Path) -> None:

@@ -6,18 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+from scipy.ndimage import gaussian_filter1d
 
 from stridecast.body import kinematics
-from stridecast.body.legs import reach
 from stridecast.geometry import ground, signals
 from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import LEFT, RIGHT, SIDES
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
-from stridecast.samples.adult import HEEL, SOLE, adult, roll_over
+from stridecast.samples.adult import adult
 from stridecast.samples.gait import GaitModel, Posture, gait_model, moved_joints
 from stridecast.samples.manner import NEUTRAL, Manner, Variation
+from stridecast.samples.planting import Stance, plant, smooth
 
 Array = np.ndarray
 
@@ -35,21 +35,6 @@ CHANGE = 0.16
 
 SLOWEST_RUN = (1.1, 1.9)
 """Who gathers speed for a run, or brakes from one, walks below the first speed and runs above the second, m/s."""
-
-FLAT = 0.22
-"""A foot pitched less than this in a stance is pressed flat on the floor, the more the less it is pitched, radians."""
-
-STRAIGHTEST = np.radians(7)
-"""A knee is bent at least this far: a leg pulled quite straight snaps."""
-
-CLEARANCE = 0.012
-"""A swinging foot keeps so far off the floor, metres."""
-
-FADE = 0.1
-"""What a stance does to a foot's movement is forgotten within this time of the swing, seconds."""
-
-STANCE_WIDTH = 0.5
-"""Share of a stance, about its middle, whose mean place becomes the place where the foot stands."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,13 +111,13 @@ def perform(
     chance = Variation(seed=seed, seconds=len(speeds) / rate, amount=variation)
     positions, headings = _route(speeds, turns, rate)
     run = gaussian_filter1d(running.astype(float), CHANGE * rate / 2, mode="nearest")
-    run = run * _smooth((speeds - SLOWEST_RUN[0]) / (SLOWEST_RUN[1] - SLOWEST_RUN[0]))
+    run = run * smooth((speeds - SLOWEST_RUN[0]) / (SLOWEST_RUN[1] - SLOWEST_RUN[0]))
     phases, hurries, still = _rhythm(model, speeds, turns, run, rate, manner, chance)
     posture = _posture(model, phases, speeds, turns, run, hurries, rate, manner, chance)
     stances = _stances(model, phases, speeds, run, still)
     planted = np.stack([_on_floor(own, len(speeds)) for own in stances], axis=-1)
     root, rotations = _body(skeleton, posture, positions, headings)
-    root, rotations = _planted(skeleton, root, rotations, stances, headings, rate, chance)
+    root, rotations = plant(skeleton, root, rotations, stances, headings, rate, chance)
     return SampleTake(
         motion=Motion(
             skeleton=skeleton, frame_rate=rate, root_positions=root, rotations=rotations, name=name, subject="sample"
@@ -145,23 +130,6 @@ def perform(
         running=run > 0.5,
         style=manner.name,
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Stance:
-    """A foot on the floor: from when to when, when the feet pass, and when steps rest if they do (all in frames)."""
-
-    start: float
-    stop: float
-    passing: float
-    phase: float
-    rest: tuple[int, int, int] | None  # first and last frame of rest, and one at which the vehicle stands still
-
-
-def _smooth(u: Array) -> Array:
-    """0 below 0, 1 above 1, smooth between."""
-    u = np.clip(u, 0.0, 1.0)
-    return u * u * u * (10 - 15 * u + 6 * u * u)
 
 
 def _sum(values: Array, rate: float) -> Array:
@@ -202,9 +170,9 @@ def _rhythm(
         grid = np.arange(frames)
         ease = np.ones(frames)
         if first > 0:
-            ease *= _smooth((grid - begin) / (EASE * rate))
+            ease *= smooth((grid - begin) / (EASE * rate))
         if last < frames:
-            ease *= _smooth((end - grid) / (EASE * rate))
+            ease *= smooth((end - grid) / (EASE * rate))
         pace[begin:end] *= ease[begin:end]
     pace[still] = 0.0
     phases = _sum(pace, rate)
@@ -242,7 +210,7 @@ def _posture(
     swinging = walk * model.walk.channels(phases, *given) + both * model.run.channels(phases, *given)
     middle = walk * model.walk.middles(*given) + both * model.run.middles(*given)
     moving = middle + manner.gains(skeleton) * (swinging - middle)
-    go = _smooth(speeds / FULL_GAIT)[:, None]
+    go = smooth(speeds / FULL_GAIT)[:, None]
     channels = model.stand + go * (moving - model.stand) + manner.offsets(skeleton)
     channels += chance.posture(channels.shape[1], frames)
     place = len(channels[0]) - 7
@@ -252,7 +220,7 @@ def _posture(
 
 def _stances(
     model: GaitModel, phases: Array, speeds: Array, run: Array, still: Bool[Array, "frames"]
-) -> tuple[list[_Stance], list[_Stance]]:
+) -> tuple[list[Stance], list[Stance]]:
     """Every stance of each foot, also those cut by the ends of the take."""
     frames = len(phases)
     grid = np.arange(frames)
@@ -266,7 +234,7 @@ def _stances(
             return float(frames - 1 + (phase - rising[-1]) / pace[1])
         return float(np.interp(phase, rising, grid))
 
-    found: tuple[list[_Stance], list[_Stance]] = ([], [])
+    found: tuple[list[Stance], list[Stance]] = ([], [])
     for foot in (LEFT, RIGHT):
         own = np.pi * foot
         first = int(np.floor((phases[0] - own) / (2 * np.pi))) - 1
@@ -284,11 +252,11 @@ def _stances(
             low, high = max(0, int(np.ceil(start))), int(np.floor(min(stop, frames - 1))) + 1
             rests = low + np.flatnonzero(still[low:high])
             rest = (int(rests[0]), int(rests[-1]), int(rests[np.argmin(speeds[rests])])) if len(rests) else None
-            found[foot].append(_Stance(start=start, stop=stop, passing=passing, phase=phase, rest=rest))
+            found[foot].append(Stance(start=start, stop=stop, passing=passing, phase=phase, rest=rest))
     return found
 
 
-def _on_floor(stances: list[_Stance], frames: int) -> Bool[Array, "frames"]:
+def _on_floor(stances: list[Stance], frames: int) -> Bool[Array, "frames"]:
     grid = np.arange(frames)
     return np.any([(grid >= s.start) & (grid <= s.stop) for s in stances], axis=0)
 
@@ -310,182 +278,7 @@ def _body(
     return root, rotations
 
 
-def _planted(
-    skeleton: Skeleton,
-    root: Float[Array, "frames 3"],
-    rotations: Float[Array, "frames joints 4"],
-    stances: tuple[list[_Stance], list[_Stance]],
-    headings: Float[Array, "frames"],
-    rate: float,
-    chance: Variation,
-) -> tuple[Float[Array, "frames 3"], Float[Array, "frames joints 4"]]:
-    """The same motion with feet that stand where they stand; the pelvis sinks where a leg would not reach."""
-    world = kinematics.forward(skeleton, root, rotations)
-    feet = [
-        _foot(skeleton, world, side, stances[column], headings, rate, chance) for column, side in enumerate(SIDES)
-    ]
-    root = root - np.array([0.0, 1.0, 0.0]) * _sinking(skeleton, world, [foot.ankles for foot in feet], rate)[:, None]
-    for side, foot in zip(SIDES, feet, strict=True):
-        ankle, toe = skeleton.chain(f"{side}_foot", f"{side}_toe")
-        above = kinematics.forward(skeleton, root, rotations).rotations[:, skeleton.parents[ankle]]
-        rotations[:, ankle] = quat.multiply(quat.inverse(above), foot.rotations)
-        rotations = reach(skeleton, root, rotations, side, foot.ankles)
-        rotations[:, toe] = foot.toes
-    return root, quat.continuous(quat.normalize(rotations))
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Foot:
-    """Where a foot goes: ankles and rotations in the world, toes against the foot."""
-
-    ankles: Float[Array, "frames 3"]
-    rotations: Float[Array, "frames 4"]
-    toes: Float[Array, "frames 4"]
-
-
-def _foot(
-    skeleton: Skeleton,
-    world: kinematics.World,
-    side: str,
-    stances: list[_Stance],
-    headings: Float[Array, "frames"],
-    rate: float,
-    chance: Variation,
-) -> _Foot:
-    """One foot: in a stance it rolls over heel and toe, in a swing it goes from one stance to the next."""
-    ankle, toe = skeleton.chain(f"{side}_foot", f"{side}_toe")
-    ball = skeleton.offsets[toe]
-    angles = np.unwrap(quat.to_euler(world.rotations[:, ankle], "YXZ"), axis=0)
-    ankles = world.positions[:, ankle]
-    balls = ground.project(ankles + quat.rotate(world.rotations[:, ankle], ball))
-    frames = len(ankles)
-    places = chance.places(SIDES.index(side), len(stances))
-    # Corrections to yaw, pitch, roll and ankle: known in stances, smooth between.
-    corrections, known = np.zeros((frames, 6)), np.zeros(frames, bool)
-    for stance, beside in zip(stances, places, strict=True):
-        at = np.arange(max(0, int(np.ceil(stance.start))), min(frames - 1, int(np.floor(stance.stop))) + 1)
-        if len(at) == 0:
-            continue
-        if stance.rest is not None:
-            middle = np.array([stance.rest[2]])
-        else:
-            half = STANCE_WIDTH * (stance.stop - stance.start) / 2
-            centre = np.clip((stance.start + stance.stop) / 2, at[0], at[-1])
-            middle = at[np.abs(at - centre) <= max(half, 1.0)]
-        yaw = float(angles[middle, 0].mean())
-        place = balls[middle].mean(axis=0)
-        if stance.rest is None:
-            place = place + ground.turn(beside, headings[middle[len(middle) // 2]])
-        pitches = _pitch_in_stance(angles[at, 1], ankles[at, 1], ball, at, stance, rate)
-        target = ground.lift(place) + quat.rotate(quat.about_y(yaw), roll_over(pitches, ball))
-        corrections[at, 0] = yaw - angles[at, 0]
-        corrections[at, 1] = pitches - angles[at, 1]
-        corrections[at, 2] = -angles[at, 2]
-        corrections[at, 3:] = target - ankles[at]
-        known[at] = True
-    _bridge(corrections, known, FADE * rate)
-    angles = angles + corrections[:, :3]
-    turned = quat.from_euler(angles, "YXZ")
-    ankles = _clear(ankles + corrections[:, 3:], turned, ball, skeleton, toe, known, rate)
-    bent = np.maximum(angles[:, 1], 0.0) * _toes_flat(known, rate)
-    return _Foot(ankles=ankles, rotations=turned, toes=quat.exp(-bent[:, None] * np.array([1.0, 0.0, 0.0])))
-
-
-def _pitch_in_stance(pitches: Array, heights: Array, ball: Array, at: Array, stance: _Stance, rate: float) -> Array:
-    """Pitch of a standing foot: first as the posture says, small ones pressed flat; later what the height of
-    the ankle asks for; flat at rest.
-    """
-    long, level = np.hypot(ball[1], ball[2]), np.arctan2(-ball[1], ball[2])
-    lifted = np.arcsin(np.clip((heights - SOLE) / long, np.sin(level), 0.98)) - level
-    early = 0.6 * stance.start + 0.4 * stance.passing
-    late = _smooth((at - early) / (0.6 * (stance.stop - early)))
-    out = (1 - late) * pitches * _smooth(np.abs(pitches) / FLAT) + late * lifted
-    if stance.rest is not None:
-        first, last, _ = stance.rest
-        since = stance.passing if stance.passing <= first else stance.start + 0.03 * rate
-        before = 1 - _smooth((at - since) / (0.15 * rate))
-        after = _smooth((at - last) / (0.2 * rate))
-        out = out * np.maximum(before if stance.start > 0 else 0.0, after)
-    return out
-
-
-def _bridge(corrections: Float[Array, "frames 6"], known: Bool[Array, "frames"], fade: float) -> None:
-    """Fill unknown stretches smoothly; slopes of the known ones fade within ``fade`` frames; constant beyond the ends."""
-    for value, start, stop in signals.runs(known):
-        if value:
-            continue
-        left, right = start - 1, stop
-        if left < 0 or right >= len(known):
-            corrections[start:stop] = corrections[right if left < 0 else left] if known.any() else 0.0
-            continue
-        span = float(right - left)
-        slopes = [
-            (corrections[left] - corrections[left - 1]) if left > 0 and known[left - 1] else np.zeros(6),
-            (corrections[right + 1] - corrections[right])
-            if right + 1 < len(known) and known[right + 1]
-            else np.zeros(6),
-        ]
-        since = (np.arange(start, stop) - left)[:, None].astype(float)
-        blend = _smooth(since / span)
-        corrections[start:stop] = (
-            (1 - blend) * corrections[left]
-            + blend * corrections[right]
-            + slopes[0] * _fading(since, min(fade, span / 2))
-            - slopes[1] * _fading(span - since, min(fade, span / 2))
-        )
-
-
-def _fading(since: Array, fade: float) -> Array:
-    """A slope of one at the start that is gone after ``fade`` frames."""
-    return since * np.maximum(1 - since / fade, 0.0) ** 2
-
-
-def _clear(
-    ankles: Array, turned: Array, ball: Array, skeleton: Skeleton, toe: int, known: Array, rate: float
-) -> Float[Array, "frames 3"]:
-    """A swinging foot lifted where its heel, ball or toes would brush the floor."""
-    lows = [
-        ankles[:, 1] + quat.rotate(turned, HEEL)[:, 1],
-        ankles[:, 1] + quat.rotate(turned, ball)[:, 1] - SOLE,
-    ]
-    missing = np.where(known, 0.0, np.maximum(CLEARANCE - np.minimum(*lows), 0.0))
-    for value, start, stop in signals.runs(known):
-        if not value and start > 0 and stop < len(known):
-            u = (np.arange(start, stop) - start + 1) / (stop - start + 1)
-            gate = np.sin(np.pi * u)
-            need = float((missing[start:stop] * np.minimum(1.0, 3 * gate)).max())
-            ankles[start:stop, 1] += need * np.sin(np.pi * u) ** 2
-    return ankles
-
-
-def _toes_flat(known: Array, rate: float) -> Float[Array, "frames"]:
-    """Toes lie on the floor while the foot stands, and follow the foot in the swing."""
-    out = np.ones(len(known))
-    for value, start, stop in signals.runs(known):
-        if not value:
-            u = (np.arange(start, stop) - start + 1) / (stop - start + 1)
-            out[start:stop] = 1 - _smooth(u / 0.35) * (1 - _smooth((u - 0.75) / 0.25))
-    return out
-
-
-def _sinking(
-    skeleton: Skeleton, world: kinematics.World, ankles: list[Float[Array, "frames 3"]], rate: float
-) -> Float[Array, "frames"]:
-    """How far the pelvis must sink so that both legs reach with a bent knee, smooth in time."""
-    need = np.zeros(len(ankles[0]))
-    for side, goal in zip(SIDES, ankles, strict=True):
-        thigh, shin, foot = skeleton.chain(f"{side}_thigh", f"{side}_shin", f"{side}_foot")
-        upper, lower = (float(np.linalg.norm(skeleton.offsets[joint])) for joint in (shin, foot))
-        longest = np.sqrt(upper**2 + lower**2 + 2 * upper * lower * np.cos(STRAIGHTEST))
-        hip = world.positions[:, thigh]
-        across = np.sum((hip - goal)[:, [0, 2]] ** 2, axis=-1)
-        reach_up = np.sqrt(np.maximum(longest**2 - across, 0.0))
-        need = np.maximum(need, hip[:, 1] - goal[:, 1] - reach_up)
-    width = 0.05 * rate
-    return gaussian_filter1d(maximum_filter1d(need, 2 * round(2 * width) + 1, mode="nearest"), width, mode="nearest")
-
-
-def _from_mid_stances(phases: Array, stances: tuple[list[_Stance], list[_Stance]]) -> Float[Array, "frames"]:
+def _from_mid_stances(phases: Array, stances: tuple[list[Stance], list[Stance]]) -> Float[Array, "frames"]:
     """Phase counted from the middles of stances instead of the moments at which the feet pass."""
     grid = np.arange(len(phases))
     known = sorted(

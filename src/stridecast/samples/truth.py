@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from stridecast.samples.corpus import SampleTake
+    from stridecast.samples.performance import SampleTake
 
 COLUMNS = ("frame", "time", "x", "z", "heading", "speed", "phase", "left_planted", "right_planted")
 """The columns. Metres, seconds, radians, metres a second; 1 where a foot is planted, else 0."""
