@@ -10,7 +10,7 @@ STAMP := .venv/.installed
 .DEFAULT_GOAL := help
 
 help:
-	@echo "make demo     learn from recordings, then walk: writes demo/"
+	@echo "make demo     a character walks, turns, runs and stops: writes demo/"
 	@echo "make test     tests and examples"
 	@echo "make check    format, lint, types, layers"
 	@echo "make bench    how fast it is"

@@ -1,6 +1,6 @@
 """A character driven by forces, as a joystick gives them: walk, lean to the left, run, let go.
 
-python examples/joystick.py DATABASE
+python examples/joystick.py [DATABASE]
 """
 
 from __future__ import annotations
@@ -13,10 +13,7 @@ import stridecast as sc
 
 
 def main() -> None:
-    if len(sys.argv) < 2:
-        print(__doc__)
-        return
-    walker = sc.Walker(sc.load_database(sys.argv[1]))
+    walker = sc.Walker(sc.load_database(sys.argv[1]) if len(sys.argv) > 1 else sc.sample_database())
     heading = 0.0
     for frame in range(240):
         seconds = frame / walker.frame_rate

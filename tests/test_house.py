@@ -39,6 +39,7 @@ PUBLIC = [
     "Walkers",
     "WishError",
     "build",
+    "fetch",
     "load_database",
     "load_motion",
     "load_skeleton",

@@ -1,7 +1,7 @@
 """stridecast: on-line human locomotion from motion capture.
 
     >>> import stridecast as sc
-    >>> database = sc.build(["recordings/"])            # doctest: +SKIP
+    >>> database = sc.sample_database()                 # doctest: +SKIP
     >>> walker = sc.Walker(database)                    # doctest: +SKIP
     >>> pose = walker.step((0.0, 1.5), motion="walk")   # doctest: +SKIP
 
@@ -35,12 +35,14 @@ if TYPE_CHECKING:
     from stridecast.model.pose import Pose, VehicleState
     from stridecast.model.skeleton import Skeleton
     from stridecast.samples.library import sample_database
+    from stridecast.samples.recordings import fetch
     from stridecast.steering.force import SteeringGains
     from stridecast.synthesis.walker import Walker, Walkers
 
 _HOME = {
     "build": "building.build",
     "sample_database": "samples.library",
+    "fetch": "samples.recordings",
     "load_database": "formats.store",
     "save_database": "formats.store",
     "load_motion": "formats.recordings",
@@ -70,6 +72,7 @@ __version__ = "0.1.0"
 __all__ = [  # noqa: RUF022
     "build",
     "sample_database",
+    "fetch",
     "load_database",
     "save_database",
     "load_motion",
