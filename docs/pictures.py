@@ -9,21 +9,34 @@ out.
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from PIL import Image
 
 import stridecast as sc
 from stridecast.analysis.take import TakeAnalysis, analyse
-from stridecast.formats.picture import INPUT, PELVIS, VEHICLE, write_picture
+from stridecast.body import kinematics
+from stridecast.formats.picture import INPUT, PELVIS, VEHICLE, Camera, draw_body, write_picture
+from stridecast.samples.adult import adult
+from stridecast.samples.corpus import Leg, Recipe, sample_take
+from stridecast.samples.performance import SampleTake, perform
 from stridecast.steering.curves import named_curve
 from stridecast.synthesis.journey import Journey, PointStream, follow, stream_along
 
 HERE = Path(__file__).resolve().parent
 OUT = HERE / "pictures"
-sys.path.insert(0, str(HERE.parent / "examples"))
+sys.path[:0] = [str(HERE.parent / "examples"), str(HERE.parent / "bench")]
+
+ODD = ("08_05", "08_11", "09_12", "17_03", "127_13", "14_04", "14_37")
+"""Takes in which nobody goes plainly."""
+
+BESIDE = ((0.8, "16_17"), (1.4, "16_47"), (1.9, "08_08"), (2.5, "02_03"), (4.0, "16_45"))
+"""Speeds (m/s) and takes in which somebody goes about as fast."""
 
 
 def main() -> None:
@@ -37,14 +50,23 @@ def main() -> None:
     vehicle([analyse(sc.load_motion(path)) for path in take_files(folder, "16_27", "16_29", "16_37", "16_31")])
     bounds(folder, database)
     contacts([analyse(sc.load_motion(path)) for path in take_files(folder, "16_31", "16_33", "16_55", "127_04")])
+    gait(folder)
+    sample(folder)
 
 
 def take_files(folder: Path, *names: str) -> list[Path]:
-    return [next(folder.rglob(f"{name}.amc")) for name in names]
+    return [next(path for end in ("amc", "bvh") for path in folder.rglob(f"{name}.{end}")) for name in names]
 
 
-def save(figure: Figure, name: str) -> None:
-    figure.savefig(OUT / name, format="png")
+def save(figure: Figure, name: str, colours: int | None = None) -> None:
+    """Write a picture; one of few colours is a third as large."""
+    if colours is None:
+        figure.savefig(OUT / name, format="png")
+    else:
+        canvas = FigureCanvasAgg(figure)
+        canvas.draw()
+        drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+        drawn.quantize(colours, dither=Image.Dither.NONE).save(OUT / name, optimize=True)
     print(f"wrote {OUT / name}")
 
 
@@ -167,9 +189,167 @@ def contacts(takes: list[TakeAnalysis]) -> None:
 
 
 def sc_world(motion: sc.Motion) -> np.ndarray:
-    from stridecast.body import kinematics
-
     return kinematics.pose(motion).positions
+
+
+def gait(folder: Path) -> None:
+    """What people, the sample person and a walker measure, against speed."""
+    from gait import MEASURES, by_take, performed, recorded, walked
+
+    people = by_take(recorded([folder], ODD))
+    lines = (("sample person", by_take(performed()), "-"), ("walker", by_take(walked(sc.sample_database())), "--"))
+    subjects = sorted({s.who for s in people}, key=lambda who: (len(who), who))
+    figure = Figure(figsize=(13, 5.6), dpi=80, layout="constrained")
+    grid = figure.subplots(2, (len(MEASURES) + 1) // 2, sharex=True).ravel()
+    for number, (axes, (_, _, title)) in enumerate(zip(grid, MEASURES, strict=False)):
+        for place, who in enumerate(subjects):
+            at = [(s.speed, s.values[number]) for s in people if s.who == who]
+            axes.plot(*np.transpose(at), "o", markersize=4, alpha=0.7, color=f"C{place}", label=f"subject {who}")
+        for label, found, style in lines:
+            for motion in ("walk", "run"):
+                at = sorted((s.speed, s.values[number]) for s in found if s.motion == motion)
+                shown = label if motion == "walk" else None
+                axes.plot(*np.transpose(at), style, color="black", linewidth=1.5, label=shown)
+        axes.set_title(title, fontsize=10)
+        axes.set_ylim(bottom=0)
+    for axes in grid[-(len(grid) // 2) :]:
+        axes.set_xlabel("speed, m/s")
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=9, frameon=False)
+    save(figure, "gait.png")
+
+
+class Stage(Camera):
+    """Looks level at one body from far away and puts it somewhere on the paper (metres)."""
+
+    def __init__(self, body: np.ndarray, paper: tuple[float, float], distance: float, azimuth: float, tilt: float):
+        super().__init__(np.array([body[0], 0.0, body[2]]), distance, azimuth, tilt)
+        self.shift = np.array(paper) / distance
+
+    def see(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Picture coordinates and depth."""
+        seen, depth = super().see(points)
+        return seen + self.shift, depth
+
+
+class Paper:
+    """A picture of bodies, laid out in metres from its lower left corner."""
+
+    def __init__(self, width: float, height: float, inches: float = 13.0) -> None:
+        self.figure = Figure(figsize=(inches, inches * height / width), dpi=100)
+        self.axes = self.figure.add_axes((0, 0, 1, 1))
+        # A body is drawn as thick as it should be if a picture of width one were seven per cent wider than the paper.
+        self.distance = 1.05 * width
+        self.axes.set_xlim(0, width / self.distance)
+        self.axes.set_ylim(0, height / self.distance)
+        self.axes.axis("off")
+        self.layer = 10
+
+    def body(
+        self, motion: sc.Motion, frame: int, place: tuple[float, float], azimuth: float, tilt: float = 0.04
+    ) -> None:
+        """Draw one pose above a place on the paper, seen from a side (0 is from +Z) and a little from above."""
+        world = kinematics.forward(motion.skeleton, motion.root_positions[[frame]], motion.rotations[[frame]])
+        ends = kinematics.ends(motion.skeleton, world)[0]
+        camera = Stage(world.positions[0, 0], place, self.distance, azimuth, tilt)
+        draw_body(self.axes, camera, motion.skeleton, world.positions[0], ends, self.layer)
+        self.layer += 1
+
+    def floor(self, left: float, right: float, height: float) -> None:
+        """Draw a line to stand on."""
+        at = np.array([left, right]) / self.distance
+        self.axes.plot(at, [height / self.distance] * 2, color="#cbd5e0", linewidth=1, zorder=0)
+
+    def write(self, place: tuple[float, float], text: str, size: float = 10.0) -> None:
+        """Write left-aligned text."""
+        self.axes.text(place[0] / self.distance, place[1] / self.distance, text, fontsize=size, va="center")
+
+
+FROM_RIGHT = -np.pi / 2
+"""Azimuth of a camera that sees a body that faces +Z go to the right."""
+
+
+def sample(folder: Path) -> None:
+    """The sample person beside recorded people, pose by pose through a stride, and turning, starting and stopping."""
+    width, row, label, sides, fronts = 18.4, 2.0, 1.7, 9, 6
+    strips = sample_strips()
+    height = row * (2 * len(BESIDE) + len(strips)) + 0.3
+    paper = Paper(width, height)
+    level = height - 0.2
+    for speed, name in BESIDE:
+        (path,) = take_files(folder, name)
+        people = analyse(sc.load_motion(path), adult())
+        side, frames = stride_near(people, speed)
+        pace = float(people.vehicle.speeds[frames].mean())
+        running = np.full(720, any(s.motion == "run" for s in people.gait.segments))
+        made = analyse(perform(np.full(720, pace), np.zeros(720), running=running, rate=120.0, seed=1).motion)
+        for take, shown, words in (
+            (made, stride_near(made, pace, side)[1], "sample person"),
+            (people, frames, f"subject {people.motion.subject}"),
+        ):
+            level -= row
+            paper.floor(label, width - 0.2, level)
+            paper.write((0.15, level + 1.15), f"{pace:.2f} m/s\n{words}")
+            for count, x0, step, azimuth in (
+                (sides, label + 0.6, 1.2, FROM_RIGHT),
+                (fronts, label + 11.6, 0.9, 0.0),
+            ):
+                for k, frame in enumerate(shown[np.arange(count) * len(shown) // count]):
+                    facing = float(take.vehicle.headings[frame])
+                    paper.body(take.motion, frame, (x0 + k * step, level), facing + azimuth)
+    for words, take, (begin, stop, every), azimuth, tilt in strips:
+        level -= row
+        paper.write((0.15, level + 1.15), words)
+        paper.floor(label, width - 0.2, level)
+        at = np.arange(begin, stop, every) * take.motion.frame_rate
+        step = (width - label - 1.2) / (len(at) - 1)
+        for k, frame in enumerate(at):
+            paper.body(take.motion, round(frame), (label + 0.5 + k * step, level), azimuth, tilt)
+    save(paper.figure, "sample.png", colours=32)
+
+
+def stride_near(take: TakeAnalysis, speed: float, side: int | None = None) -> tuple[int, np.ndarray]:
+    """Foot (any, or the one asked for) and frames of the stride, mid-stance to mid-stance, whose speed is nearest."""
+    stances = take.gait.mid_stances
+    found = [
+        (a.side, np.arange(round(a.frame), round(b.frame)))
+        for a, b in zip(stances, stances[2:], strict=False)
+        if a.side == b.side and side in (None, a.side)
+    ]
+    return min(found, key=lambda stride: abs(float(take.vehicle.speeds[stride[1]].mean()) - speed))
+
+
+def sample_strips() -> Sequence[tuple[str, SampleTake, tuple[float, float, float], float, float]]:
+    """What it is, a take, from when to when how often (seconds), and seen from where."""
+
+    def turning(side: int) -> SampleTake:
+        return sample_take(
+            Recipe(
+                name="turn",
+                speed=1.3,
+                legs=(Leg(seconds=1.5), Leg(seconds=1.6, turn=side * np.pi / 2), Leg(seconds=1.5)),
+            ),
+            seed=1,
+        )
+
+    start = sample_take(
+        Recipe(name="start", legs=(Leg(seconds=1.0), Leg(seconds=1.9, speed=1.3), Leg(seconds=1.5))), seed=1
+    )
+    stop = sample_take(
+        Recipe(name="stop", speed=1.3, legs=(Leg(seconds=1.5), Leg(seconds=2.2, speed=0.0), Leg(seconds=1.0))), seed=1
+    )
+    run = sample_take(
+        Recipe(
+            name="run", speed=1.4, legs=(Leg(seconds=1.0), Leg(seconds=1.1, speed=3.5, running=True), Leg(seconds=1.0))
+        ),
+        seed=1,
+    )
+    return (
+        ("turn left\n1.3 m/s", turning(1), (1.0, 3.6, 0.2), FROM_RIGHT / 2, 0.2),
+        ("turn right\n1.3 m/s", turning(-1), (1.0, 3.6, 0.2), -FROM_RIGHT / 2, 0.2),
+        ("start", start, (0.9, 3.0, 0.15), FROM_RIGHT, 0.04),
+        ("stop", stop, (1.9, 4.0, 0.15), FROM_RIGHT, 0.04),
+        ("walk to run\n1.4 to 3.5 m/s", run, (0.9, 2.6, 0.1), FROM_RIGHT, 0.04),
+    )
 
 
 if __name__ == "__main__":

@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from stridecast.analysis.events import find_gait, label_motions, support_phases
+from stridecast.analysis.events import find_gait, find_mid_stances, label_motions, support_phases
 from stridecast.analysis.take import analyse
 from stridecast.body.mirroring import mirror
 from stridecast.formats.recordings import load_motion
 from stridecast.model.contacts import LEFT, RIGHT, Contacts
-from stridecast.model.segment import Boundary, Segment
+from stridecast.model.segment import Boundary, Phase, Segment
+from stridecast.samples.performance import perform
 from synthetic_gait import gait, ramps
 
 RATE = 60.0
@@ -68,6 +69,50 @@ def test_speed_decides_what_a_step_without_either_was():
     support = "L" * 20 + "R" * 20
     assert [p.state for p in support_phases(support, np.full(40, 1.2), RATE)] == ["L", "D", "R"]
     assert [p.state for p in support_phases(support, np.full(40, 3.0), RATE)] == ["L", "F", "R"]
+
+
+@pytest.mark.parametrize("speed", [1.8, 2.05, 2.5])
+def test_between_walking_and_running_the_bounce_decides(speed):
+    """Steps without either, and a short gap between contacts: a runner's body is high then, a walker's low."""
+    for between, running, walking in (("", "F", "D"), ("FFF", "F", "D"), ("DDD", "F", "D")):
+        support = between.join(("L" * 20, "R" * 20, "L" * 20, "R" * 20))
+        step = 20 + len(between)
+        bounce = 0.02 * np.cos(2 * np.pi * (np.arange(len(support)) - 20) / step)  # high where the feet change
+        speeds = np.full(len(support), speed)
+        for heights, wanted in ((0.95 + bounce, running), (0.95 - bounce, walking)):
+            found = support_phases(support, speeds, RATE, heights)
+            assert "".join(p.state for p in found) == f"L{wanted}R{wanted}L{wanted}R"
+
+
+@pytest.mark.parametrize(("speed", "wanted"), [(1.6, "D"), (2.7, "F")])
+def test_beyond_that_the_bounce_decides_nothing(speed, wanted):
+    bounce = 0.95 + 0.02 * np.cos(2 * np.pi * (np.arange(80) - 20) / 20)
+    for heights in (bounce, 1.9 - bounce):
+        found = support_phases("L" * 20 + "R" * 20 + "L" * 20 + "R" * 20, np.full(80, speed), RATE, heights)
+        assert "".join(p.state for p in found) == f"L{wanted}R{wanted}L{wanted}R"
+
+
+@pytest.mark.parametrize("speed", [2.0, 2.2])
+def test_where_the_take_ends_the_step_before_tells_running_from_walking(speed):
+    """Only a corner of the last gap is seen, and on one side of it no whole stance."""
+    support = "FF" + "FFF".join(("L" * 15, "R" * 15, "L" * 15)) + "FF"
+    bounce = 0.02 * np.cos(2 * np.pi * (np.arange(len(support)) + 0.5) / 18)
+    for heights, wanted in ((0.95 + bounce, "F"), (0.95 - bounce, "D")):
+        found = support_phases(support, np.full(len(support), speed), RATE, heights)
+        assert "".join(p.state for p in found) == f"{wanted}L{wanted}R{wanted}L{wanted}"
+
+
+def test_a_stance_that_the_take_cuts_is_measured_by_those_beside_it():
+    """In a take that gets slower, the first stances are short and the last are long."""
+    lengths = [24, 24, 24, 24, 36, 36, 36, 36]
+    edges = np.concatenate(([0], np.cumsum(lengths)))
+    phases = [Phase("LR"[i % 2], int(a), int(b)) for i, (a, b) in enumerate(pairwise(edges))]
+    frames = phases[-1].stop
+    cut = [Phase(phases[0].state, 0, 18), *(Phase(p.state, p.start - 6, p.stop - 6) for p in phases[1:-1])]
+    cut.append(Phase(phases[-1].state, phases[-1].start - 6, frames - 15))
+    found = find_mid_stances(cut, frames - 15)
+    assert found[0] == (18 - 25 / 2, LEFT)
+    assert found[-1] == (cut[-1].start + 35 / 2, RIGHT)
 
 
 # segments of anything
@@ -166,6 +211,18 @@ def test_standing_ends_are_boundaries_and_starts_and_stops_are_segments(speed):
     assert [s.string[0] + s.string[-1] for s in (found[0], found[-1])] == ["SS", "SS"]
     assert found[1].string.startswith("S")
     assert found[-2].string.endswith("S")
+
+
+@pytest.mark.parametrize(("speed", "running"), [(2.0, False), (2.1, False), (2.2, False), (2.0, True), (2.2, True)])
+def test_the_sample_person_may_walk_fast_or_run_slowly(speed, running):
+    """Cut anywhere, it is one or the other to the last segment."""
+    frames = np.full(600, speed)
+    take = perform(frames, 0 * frames, running=np.full(600, running), seed=round(10 * speed)).motion
+    lawful = {"FLF", "FRF"} if running else {"LDR", "RDL"}
+    for start, stop in ((0, 600), *((start, start + 90) for start in range(0, 510, 37))):
+        found = strings(take.clip(start, stop))
+        assert found
+        assert set(found) <= lawful, f"frames {start} to {stop}"
 
 
 def test_walking_to_running_and_back_is_found():

@@ -16,7 +16,7 @@ ENTER_SPEED = (0.35, 0.18)
 """A foot comes to stand below this speed: m/s for a leg of one metre, plus a share of the walker's own speed (a
 runner's soft shoe rolls faster than a walker's)."""
 
-LEAVE_SPEED = (0.5, 0.27)
+LEAVE_SPEED = (0.5, 0.22)
 """It leaves above this speed, the same way."""
 
 NEAR_FLOOR = 0.075

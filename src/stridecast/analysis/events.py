@@ -31,6 +31,9 @@ SHORTEST_FLIGHT = 0.06
 LONGEST_BRUSH = 0.1
 """Both feet on the floor for less than this in a run is a step with no air under it, as in sharp turns, seconds."""
 
+NEAR_STANCES = 3
+"""So many whole stances tell how long one is beside them that the take cuts short."""
+
 LONGEST = 1.7
 """A moving segment longer than this is no half cycle, seconds."""
 
@@ -127,19 +130,32 @@ def _is_noise(phases: list[Phase], i: int, rate: float) -> bool:
 def _is_running(
     phases: list[Phase], i: int, speeds: Float[np.ndarray, "frames"], heights: Float[np.ndarray, "frames"] | None
 ) -> bool:
-    """Whether a change from foot to foot is one of running: a runner's body is high then, a walker's low."""
+    """Whether a change from foot to foot is one of running: a runner's body is high then, a walker's low.
+
+    Where the take is cut too short to tell, the change beside it tells.
+    """
+    speed = speeds[phases[i].start]
+    if heights is not None and SLOWEST_FLIGHT < speed < FASTEST_WALK:
+        for beside in (0, -1, 1, -2, 2):
+            high = _is_high(phases, i + beside, heights) if 0 <= i + beside < len(phases) else None
+            if high is not None:
+                return high
+    return bool(speed > RUNNING_SPEED)
+
+
+def _is_high(phases: list[Phase], i: int, heights: Float[np.ndarray, "frames"]) -> bool | None:
+    """Whether the body is higher in a change from foot to foot than on the feet; None where that cannot be seen."""
     here = phases[i]
-    speed = speeds[here.start]
-    if heights is None or not SLOWEST_FLIGHT < speed < FASTEST_WALK:
-        return bool(speed > RUNNING_SPEED)
-    alone = here.state in ("L", "R")  # no state between the feet: they change at its first frame
-    around = (phases[i - 1] if i else here, here if alone else phases[min(i + 1, len(phases) - 1)])
-    whole = [p for p in around if p.state in ("L", "R") and p.start > 0 and p.stop < len(heights)]
-    if not whole or (here.start == 0 and not alone) or here.stop == len(heights):
-        return bool(speed > RUNNING_SPEED)
-    middle = here.start if alone else (here.start + here.stop - 1) // 2
-    carried = [heights[(p.start + p.stop - 1) // 2] for p in whole]
-    return bool(heights[middle] > np.mean(carried))
+    before, after = phases[max(i - 1, 0)], phases[min(i + 1, len(phases) - 1)]
+    if here.state in "LR":  # no state between the feet: they change at its first frame
+        changes, around, middle = {before.state, here.state} == {"L", "R"}, (before, here), here.start
+    else:
+        changes, around = before.state in "LR" and after.state in "LR", (before, after)
+        middle = (here.start + here.stop - 1) // 2
+    whole = [p for p in around if p.state in "LR" and p.start > 0 and p.stop < len(heights)]
+    if not whole or not changes:
+        return None
+    return bool(heights[middle] > np.mean([heights[(p.start + p.stop - 1) // 2] for p in whole]))
 
 
 def _is_missed_double(flight: Phase, speed: float, running: bool, rate: float, frames: int) -> bool:
@@ -157,14 +173,15 @@ def _replacement(phases: list[Phase], i: int) -> str:
 def find_mid_stances(phases: list[Phase], frames: int) -> list[MidStance]:
     """Middle frame of the support phase of each foot (heel strike to toe-off, double supports included).
 
-    A support phase that the take cuts short counts when at least two thirds of it are there, judged by the median of
-    the whole ones; its middle is taken from the end that can be seen.
+    A support phase that the take cuts short counts when at least two thirds of it are there, judged by the whole ones
+    next to it; its middle is taken from the end that can be seen.
     """
     carried = [(p.start, p.stop, side) for side, letter in ((LEFT, "L"), (RIGHT, "R")) for p in _merged(phases, letter)]
-    whole = [b - a for a, b, _ in carried if a > 0 and b < frames]
-    usual = float(np.median(whole)) if whole else np.inf
+    whole = sorted((a, b - a) for a, b, _ in carried if a > 0 and b < frames)
     found: list[MidStance] = []
     for a, b, side in carried:
+        near = whole[:NEAR_STANCES] if a == 0 else whole[-NEAR_STANCES:]
+        usual = float(np.median([length for _, length in near])) if near else np.inf
         if a > 0 and b < frames:
             found.append(MidStance((a + b - 1) / 2, side))
         elif b - a >= usual * 2 / 3 and (a > 0 or b < frames):

@@ -61,3 +61,40 @@ def close_gaps(values: Bool[Array, "frames"], shortest_gap: int, shortest_run: i
             if value == gone and stop - start < least and start > 0 and stop < len(out):
                 out[start:stop] = not gone
     return out
+
+
+def smooth(u: Float[Array, "*shape"]) -> Float[Array, "*shape"]:
+    """0 below 0, 1 above 1, smooth between (the least jerk, Flash and Hogan 1985)."""
+    u = np.clip(u, 0.0, 1.0)
+    return np.asarray(u * u * u * (10 - 15 * u + 6 * u * u))
+
+
+def bridge(
+    values: Float[Array, "frames channels"], known: Bool[Array, "frames"], fade: float
+) -> Float[Array, "frames channels"]:
+    """Values where they are known, smoothly from one known stretch to the next between, constant beyond the ends.
+
+    Slopes at the ends of what is known go on and fade within ``fade`` frames. All zero where nothing is known.
+    """
+    out = np.zeros_like(values)
+    if not known.any():
+        return out
+    out[known] = values[known]
+    for value, start, stop in runs(known):
+        if value:
+            continue
+        left, right = start - 1, stop
+        if left < 0 or right >= len(known):
+            out[start:stop] = out[right if left < 0 else left]
+            continue
+        span = float(right - left)
+        since = np.arange(1.0, span)[:, None]
+        share = smooth(since / span)
+        reach = min(fade, span / 2)
+        before = values[left] - values[left - 1] if left > 0 and known[left - 1] else np.zeros(values.shape[1])
+        beyond = right + 1 < len(known) and known[right + 1]
+        after = values[right + 1] - values[right] if beyond else np.zeros(values.shape[1])
+        out[start:stop] = (1 - share) * values[left] + share * values[right]
+        out[start:stop] += before * since * np.maximum(1 - since / reach, 0.0) ** 2
+        out[start:stop] -= after * (span - since) * np.maximum(1 - (span - since) / reach, 0.0) ** 2
+    return out

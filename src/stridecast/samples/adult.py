@@ -44,10 +44,13 @@ SOLE = 0.019
 HEEL = np.array([0.0, -(0.042 + SOLE), -0.05])
 """Where the heel touches the floor, in the frame of the ankle, metres."""
 
+STEEPEST = np.radians(55)
+"""The heel of a foot that still carries is raised no further, radians."""
+
 
 @cache
 def adult() -> Skeleton:
-    """Skeleton of a person of 1.75 m in a T-pose, facing +Z, with all roles. Proportions after Winter (2009)."""
+    """Skeleton of a person of 1.78 m in a T-pose, facing +Z, with all roles. Proportions after Winter (2009)."""
     rows = list(_MIDDLE)
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
         for name, parent, (x, y, z), role in _LEFT:

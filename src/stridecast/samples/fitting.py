@@ -36,7 +36,7 @@ RUNNING = (2.0, 4.5)
 STRONGEST = {"walk": (1.7, 1.2), "run": (1.7, 2.5)}
 """Turn (rad/s) and acceleration (m/s2) up to which there are enough examples."""
 
-STIFFNESS = np.array([0.0, 0.01, 0.05, 0.01, 0.01, 0.05, 0.02, 0.5, 0.02])
+STIFFNESS = np.array([0.0, 0.01, 0.05, 0.01, 0.01, 0.02, 0.02, 0.5, 0.02, 0.02])
 """How little each feature (see ``GaitTable.features``) is believed, as a share of its weight in the data."""
 
 LIKENESS = 0.05
@@ -141,8 +141,7 @@ def _fit_gait(blank: GaitTable, takes: Sequence[_Frames], stances: Float[Array, 
 
     What a person does differently is fitted beside what is common, so that it does not pass for an effect of speed.
     """
-    zeros = [np.zeros_like(t.speeds) for t in takes]
-    usual = np.concatenate([blank.features(t.speeds, t.turns, z, z) for t, z in zip(takes, zeros, strict=True)])
+    usual = np.concatenate([blank.features(t.speeds, t.turns, t.accelerations, 0 * t.speeds) for t in takes])
     waves = np.concatenate([fourier(t.phases, HARMONICS) for t in takes])
     wanted = np.concatenate([t.channels for t in takes])
     people = sorted({t.subject for t in takes})
@@ -277,7 +276,7 @@ def judge(model: GaitModel, observations: Sequence[Observation]) -> list[str]:
             if frames.sum() < 10:
                 continue
             shown = _frames(o, model.references, frames)
-            hurries = np.log(shown.strides / table.strides(shown.speeds, shown.turns))
+            hurries = np.log(shown.strides / table.strides(shown.speeds, shown.turns, shown.accelerations))
             missed = shown.channels - table.channels(
                 shown.phases, shown.speeds, shown.turns, shown.accelerations, hurries
             )

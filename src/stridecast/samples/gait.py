@@ -34,8 +34,8 @@ FEET = 6
 """Channels of the feet: rotation vectors from the vehicle's frame, left then right."""
 
 
-RHYTHM = (0, 1, 2, 5)
-"""Features that the usual rhythm depends on: speed, its square, and how sharp the turn is."""
+RHYTHM = (0, 1, 2, 5, 9)
+"""Features that the usual rhythm depends on: speed, its square, how sharp the turn is, how hard the change of speed."""
 
 HURRY = 0.3
 """Further from the usual rhythm nobody strides."""
@@ -96,7 +96,11 @@ class GaitTable:
         accelerations: Float[Array, "frames"],
         hurries: Float[Array, "frames"],
     ) -> Float[Array, "frames features"]:
-        """What coefficients depend on: speed, turn, lateral and tangential acceleration, hurry, and products."""
+        """What coefficients depend on: speed, turn, lateral and tangential acceleration, hurry, and how hard it is.
+
+        Steps are quick and flat in sharp turns to either side, and in braking as in speeding up; what is steady and
+        straight must not take part of that.
+        """
         low, high = self.speeds
         v = np.clip(speeds, low, high)
         u = (v - (low + high) / 2) / ((high - low) / 2)
@@ -104,7 +108,8 @@ class GaitTable:
         a = np.clip(accelerations, -self.acceleration, self.acceleration)
         h = np.clip(hurries, -HURRY, HURRY)
         c = 0.4 * w * v
-        return np.stack((np.ones_like(v), u, u * u, w, c, c * c, a, a * u, h), axis=-1)
+        sharp, hard = np.hypot(c, 0.1) - 0.1, np.hypot(a, 0.3) - 0.3
+        return np.stack((np.ones_like(v), u, u * u, w, c, sharp, a, a * u, h, hard), axis=-1)
 
     def channels(
         self,
@@ -140,9 +145,15 @@ class GaitTable:
         """What every channel swings about."""
         return self.features(speeds, turns, accelerations, hurries) @ self.coefficients[:, 0]
 
-    def strides(self, speeds: Float[Array, "frames"], turns: Float[Array, "frames"]) -> Float[Array, "frames"]:
-        """Strides a second, usually."""
-        given = self.features(speeds, turns, np.zeros_like(speeds), np.zeros_like(speeds))
+    def strides(
+        self,
+        speeds: Float[Array, "frames"],
+        turns: Float[Array, "frames"],
+        accelerations: Float[Array, "frames"] | None = None,
+    ) -> Float[Array, "frames"]:
+        """Strides a second, usually; at an even speed where no accelerations are given."""
+        none = np.zeros_like(speeds)
+        given = self.features(speeds, turns, none if accelerations is None else accelerations, none)
         return np.exp(given[:, RHYTHM] @ self.rhythm)
 
     def stance(self, speed: float) -> tuple[float, float]:

@@ -85,7 +85,7 @@ class Variation:
         noise = np.random.default_rng((self.seed, purpose)).standard_normal((ticks, count))
         width = slowness * self.RATE
         smooth = gaussian_filter1d(noise, width, axis=0, mode="reflect") * np.sqrt(2 * np.sqrt(np.pi) * width)
-        at = np.linspace(0.0, self.seconds, frames) * self.RATE
+        at = np.linspace(0.0, self.seconds, frames, endpoint=False) * self.RATE
         return self.amount * np.stack([np.interp(at, np.arange(ticks), column) for column in smooth.T], axis=-1)
 
     def rhythm(self, frames: int) -> Float[Array, "frames"]:

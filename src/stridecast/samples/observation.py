@@ -16,7 +16,7 @@ from stridecast.geometry import ground, signals
 from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import LEFT, RIGHT, SIDES
 from stridecast.model.motion import Motion
-from stridecast.samples.adult import adult, roll_over
+from stridecast.samples.adult import STEEPEST, adult, roll_over
 from stridecast.samples.gait import FEET, moved_joints
 
 Array = np.ndarray
@@ -35,9 +35,6 @@ NEARLY_FLAT = np.radians(15)
 
 SHORTEST_FLAT = 0.04
 """... if it stays so for this long, seconds."""
-
-STEEPEST = np.radians(55)
-"""The heel of a foot that still carries is raised no further, radians."""
 
 SLOWEST_RUN, FASTEST_WALK = 1.55, 2.05
 """Between these speeds the bounce of the pelvis tells running from walking, m/s."""

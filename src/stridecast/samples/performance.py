@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import gaussian_filter1d
 
 from stridecast.body import kinematics
+from stridecast.errors import InputError
 from stridecast.geometry import ground, signals
 from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import LEFT, RIGHT, SIDES
@@ -17,11 +18,11 @@ from stridecast.model.skeleton import Skeleton
 from stridecast.samples.adult import adult
 from stridecast.samples.gait import GaitModel, Posture, gait_model, moved_joints
 from stridecast.samples.manner import NEUTRAL, Manner, Variation
-from stridecast.samples.planting import Stance, plant, smooth
+from stridecast.samples.planting import Stance, lift_off, plant, smooth
 
 Array = np.ndarray
 
-SETS_OFF, COMES_TO_REST = 0.10, 0.26
+SETS_OFF, COMES_TO_REST = 0.10, 0.15
 """Steps begin once the vehicle is faster than the first, and end when it is slower than the second, m/s."""
 
 EASE = 0.12
@@ -32,6 +33,12 @@ FULL_GAIT = 0.55
 
 CHANGE = 0.16
 """Walking becomes running within about twice this time, seconds."""
+
+FASTEST_WALK, FASTEST_RUN = 2.4, 5.0
+"""Nobody is asked to go faster, m/s: somewhat beyond what the model has learned, the steps no longer reach."""
+
+RATES = (10.0, 1000.0)
+"""Least and greatest frame rate, frames a second."""
 
 SLOWEST_RUN = (1.1, 1.9)
 """Who gathers speed for a run, or brakes from one, walks below the first speed and runs above the second, m/s."""
@@ -66,12 +73,27 @@ class SampleTake:
     running: Bool[Array, "frames"]
     style: str = "neutral"
 
+    def __post_init__(self) -> None:
+        for name, kind in _TRUTH.items():
+            array: np.ndarray = np.array(getattr(self, name), kind)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
     def clip(self, start: int, stop: int) -> SampleTake:
         """Frames ``start`` to ``stop`` (exclusive) as a take of their own."""
-        names = ("positions", "headings", "speeds", "phases", "planted", "running")
         return replace(
-            self, motion=self.motion.clip(start, stop), **{name: getattr(self, name)[start:stop] for name in names}
+            self, motion=self.motion.clip(start, stop), **{name: getattr(self, name)[start:stop] for name in _TRUTH}
         )
+
+
+_TRUTH = {
+    "positions": np.float64,
+    "headings": np.float64,
+    "speeds": np.float64,
+    "phases": np.float64,
+    "planted": np.bool_,
+    "running": np.bool_,
+}
 
 
 def perform(
@@ -91,23 +113,31 @@ def perform(
     Parameters
     ----------
     speeds
-        Of the vehicle, m/s; zero is standing. Smooth: what it does, the body must follow.
+        Of the vehicle, m/s; zero is standing, up to 2.4 is walked and up to 5 run. Smooth: what it does, the body must
+        follow.
     turns
         Turning of the vehicle to the left, rad/s.
     running
         Where to run; left out, above 2.05 m/s.
     rate
-        Frames a second.
+        Frames a second, 10 to 1000.
     manner
         The style.
     seed, variation
         No stride is like another: by chance, and how much (0 for none).
     model
         The gait model; left out, the one that comes with the package.
+
+    Raises
+    ------
+    InputError
+        Fewer than two frames, shapes that differ, a number that is not finite, a speed that nobody walks or runs (the
+        first such frame is named), or a rate, seed or variation that is out of bounds.
     """
     model = model or gait_model()
     skeleton = adult()
     running = np.asarray(speeds > 2.05) if running is None else running
+    _check(speeds, turns, running, rate, seed, variation)
     chance = Variation(seed=seed, seconds=len(speeds) / rate, amount=variation)
     positions, headings = _route(speeds, turns, rate)
     run = gaussian_filter1d(running.astype(float), CHANGE * rate / 2, mode="nearest")
@@ -115,8 +145,9 @@ def perform(
     phases, hurries, still = _rhythm(model, speeds, turns, run, rate, manner, chance)
     posture = _posture(model, phases, speeds, turns, run, hurries, rate, manner, chance)
     stances = _stances(model, phases, speeds, run, still)
-    planted = np.stack([_on_floor(own, len(speeds)) for own in stances], axis=-1)
     root, rotations = _body(skeleton, posture, positions, headings)
+    stances = lift_off(skeleton, root, rotations, stances)
+    planted = np.stack([_on_floor(own, len(speeds)) for own in stances], axis=-1)
     root, rotations = plant(skeleton, root, rotations, stances, headings, rate, chance)
     return SampleTake(
         motion=Motion(
@@ -130,6 +161,30 @@ def perform(
         running=run > 0.5,
         style=manner.name,
     )
+
+
+def _check(speeds: Array, turns: Array, running: Array, rate: float, seed: int, variation: float) -> None:
+    shapes = [np.shape(series) for series in (speeds, turns, running)]
+    if len(shapes[0]) != 1 or len(set(shapes)) > 1 or shapes[0][0] < 2:
+        raise InputError(
+            "speeds, turns and running need one number each for each frame, of two frames at least; their shapes are "
+            + ", ".join(map(str, shapes))
+        )
+    for name, series in (("speed", speeds), ("turning", turns)):
+        if not np.isfinite(series).all():
+            raise InputError(f"{name} is not finite at frame {int(np.argmin(np.isfinite(series)))}")
+    fastest = np.where(running, FASTEST_RUN, FASTEST_WALK)
+    wrong = np.flatnonzero((speeds < 0) | (speeds > fastest))
+    if len(wrong):
+        at = int(wrong[0])
+        gait, most = ("run", FASTEST_RUN) if running[at] else ("walked", FASTEST_WALK)
+        raise InputError(f"{speeds[at]:g} m/s at frame {at} cannot be {gait}: speeds are 0 to {most:g} m/s there")
+    if not RATES[0] <= rate <= RATES[1]:
+        raise InputError(f"the frame rate must be {RATES[0]:g} to {RATES[1]:g} frames a second, not {rate}")
+    if not (np.isfinite(variation) and variation >= 0):
+        raise InputError(f"the variation must be a number from 0 on, not {variation}")
+    if seed < 0:
+        raise InputError(f"the seed must be a whole number from 0 on, not {seed}")
 
 
 def _sum(values: Array, rate: float) -> Array:
@@ -153,7 +208,8 @@ def _rhythm(
     """
     frames = len(speeds)
     hurries = chance.rhythm(frames) + np.log(manner.rhythm)
-    strides = (1 - run) * model.walk.strides(speeds, turns) + run * model.run.strides(speeds, turns)
+    given = speeds, turns, signals.lowpass(signals.rate_of_change(speeds, rate), rate, 3.0)
+    strides = (1 - run) * model.walk.strides(*given) + run * model.run.strides(*given)
     pace = 2 * np.pi * strides * np.exp(hurries)
     still = np.zeros(frames, bool)
     stretches = []
@@ -182,7 +238,7 @@ def _rhythm(
     for begin, end in stretches:
         if begin > 0 and end < frames:
             taken = phases[end] - phases[begin - 1]
-            scale = np.pi * max(1, round(taken / np.pi)) / taken
+            scale = np.pi * max(1, np.ceil(taken / np.pi - 0.05)) / taken  # rather a short step more than a lunge
             base = phases[begin - 1]
             phases[end:] += (scale - 1) * taken
             phases[begin:end] = base + scale * (phases[begin:end] - base)
@@ -234,6 +290,15 @@ def _stances(
             return float(frames - 1 + (phase - rising[-1]) / pace[1])
         return float(np.interp(phase, rising, grid))
 
+    def contact(passing: float, phase: float, end: int) -> float:
+        """When a foot comes down (0) or leaves (1), as in the gait at that moment."""
+        moment = passing
+        for _ in range(6):  # each comes several times closer
+            share, speed = (float(np.interp(moment, grid, series)) for series in (run, speeds))
+            walking, running = model.walk.stance(speed)[end], model.run.stance(speed)[end]
+            moment = when(phase + (1 - share) * walking + share * running)
+        return moment
+
     found: tuple[list[Stance], list[Stance]] = ([], [])
     for foot in (LEFT, RIGHT):
         own = np.pi * foot
@@ -242,11 +307,7 @@ def _stances(
         for n in range(first, last + 1):
             phase = own + 2 * np.pi * n
             passing = when(phase)
-            frame = int(np.clip(round(passing), 0, frames - 1))
-            share, speed = run[frame], float(speeds[frame])
-            walking, running = np.array(model.walk.stance(speed)), np.array(model.run.stance(speed))
-            down, up = (1 - share) * walking + share * running
-            start, stop = when(phase + down), when(phase + up)
+            start, stop = (contact(passing, phase, end) for end in (0, 1))
             if stop < 0 or start > frames - 1:
                 continue
             low, high = max(0, int(np.ceil(start))), int(np.floor(min(stop, frames - 1))) + 1
@@ -257,8 +318,10 @@ def _stances(
 
 
 def _on_floor(stances: list[Stance], frames: int) -> Bool[Array, "frames"]:
-    grid = np.arange(frames)
-    return np.any([(grid >= s.start) & (grid <= s.stop) for s in stances], axis=0)
+    grid, found = np.arange(frames), np.zeros(frames, bool)
+    for stance in stances:
+        found |= (grid >= stance.start) & (grid <= stance.stop)
+    return found
 
 
 def _body(
@@ -287,5 +350,6 @@ def _from_mid_stances(phases: Array, stances: tuple[list[Stance], list[Stance]])
     if not known:
         return phases
     at, angles = np.array(known).T
-    late = angles - np.interp(at, grid, phases)
-    return phases + np.interp(grid, at, late)
+    ends = phases[1] - phases[0], phases[-1] - phases[-2]
+    passed = np.interp(at, grid, phases) + ends[0] * np.minimum(at, 0.0) + ends[1] * np.maximum(at - grid[-1], 0.0)
+    return phases + np.interp(phases, passed, angles - passed)  # along the phase: where it rests, it still does

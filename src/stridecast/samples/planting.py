@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -14,7 +14,7 @@ from stridecast.geometry import ground, signals
 from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import SIDES
 from stridecast.model.skeleton import Skeleton
-from stridecast.samples.adult import HEEL, SOLE, roll_over
+from stridecast.samples.adult import HEEL, SOLE, STEEPEST, roll_over
 from stridecast.samples.manner import Variation
 
 Array = np.ndarray
@@ -27,6 +27,9 @@ STRAIGHTEST = np.radians(7)
 
 CLEARANCE = 0.012
 """A swinging foot keeps so far off the floor, metres."""
+
+RISE = 0.2
+"""A foot that is lifted for that is lifted within this share of the swing, and let down within as much."""
 
 FADE = 0.1
 """What a stance does to a foot's movement is forgotten within this time of the swing, seconds."""
@@ -50,6 +53,39 @@ def smooth(u: Array) -> Array:
     """0 below 0, 1 above 1, smooth between."""
     u = np.clip(u, 0.0, 1.0)
     return u * u * u * (10 - 15 * u + 6 * u * u)
+
+
+def lift_off(
+    skeleton: Skeleton,
+    root: Float[Array, "frames 3"],
+    rotations: Float[Array, "frames joints 4"],
+    stances: tuple[list[Stance], list[Stance]],
+) -> tuple[list[Stance], list[Stance]]:
+    """The same stances, over once the posture has the heel higher than a foot can that stands on its ball.
+
+    A foot held on the floor beyond that would pull the leg straight, and the knee would snap.
+    """
+    world = kinematics.forward(skeleton, root, rotations)
+    found: tuple[list[Stance], list[Stance]] = ([], [])
+    for column, side in enumerate(SIDES):
+        ankle, toe = skeleton.chain(f"{side}_foot", f"{side}_toe")
+        heights = world.positions[:, ankle, 1]
+        highest = float(roll_over(np.array([STEEPEST]), skeleton.offsets[toe])[0, 1])
+        found[column].extend(_lifted(stance, heights, highest) for stance in stances[column])
+    return found
+
+
+def _lifted(stance: Stance, heights: Float[Array, "frames"], highest: float) -> Stance:
+    rested = 0 if stance.rest is None else stance.rest[1]
+    first = max(rested, int(np.ceil(max(stance.start, stance.passing, 0.0))))
+    high = first + np.flatnonzero(heights[first : max(first, int(np.floor(stance.stop)) + 1)] > highest)
+    if not len(high):
+        return stance
+    at = int(high[0])
+    if at == first:
+        return replace(stance, stop=at - 0.5)
+    share = (highest - heights[at - 1]) / (heights[at] - heights[at - 1])
+    return replace(stance, stop=at - 1 + float(share))
 
 
 def plant(
@@ -110,7 +146,7 @@ def _foot(
         yaw = float(np.unwrap(yaws)[middle - at[0]].mean())
         place = balls[middle].mean(axis=0)
         if stance.rest is None:
-            place = place + ground.turn(beside, headings[middle[len(middle) // 2]])
+            place = place + ground.turn(beside, np.asarray(headings[middle[len(middle) // 2]]))
         pitches = _pitch_in_stance(pitches, ankles[at, 1], ball, at, stance, rate)
         level = quat.about_y(yaw)
         standing = quat.multiply(level, quat.exp(pitches[:, None] * _LEFTWARD))
@@ -120,8 +156,9 @@ def _foot(
     _bridge(corrections, known, FADE * rate)
     turned = quat.multiply(quat.exp(corrections[:, :3]), turned)
     ankles = _clear(ankles + corrections[:, 3:], turned, ball, known)
-    heel_up = np.arcsin(np.clip(-_elevation(turned), 0.0, 1.0))
-    return _Foot(ankles=ankles, rotations=turned, toes=quat.exp(-(heel_up * _toes_flat(known))[:, None] * _LEFTWARD))
+    tip = skeleton.end_offsets[list(skeleton.end_joints).index(toe)]
+    bend = _toe_bend(turned, ankles[:, 1] + quat.rotate(turned, ball)[:, 1], tip, known)
+    return _Foot(ankles=ankles, rotations=turned, toes=quat.exp(-bend[:, None] * _LEFTWARD))
 
 
 _LEFTWARD = np.array([1.0, 0.0, 0.0])
@@ -162,29 +199,45 @@ def _pitch_in_stance(pitches: Array, heights: Array, ball: Array, at: Array, sta
 
 
 def _bridge(corrections: Float[Array, "frames 6"], known: Bool[Array, "frames"], fade: float) -> None:
-    """Fill unknown stretches smoothly, constant beyond the ends; slopes of known ones fade within ``fade`` frames."""
+    """Fill unknown stretches smoothly; slopes of known ones fade within ``fade`` frames.
+
+    Where the take cuts a swing, it leads from or to the foot of the posture, beside which only its place stays.
+    """
+    usual = _usual_swing(known)
     for value, start, stop in signals.runs(known):
-        if value:
+        if value or not known.any():
             continue
         left, right = start - 1, stop
-        if left < 0 or right >= len(known):
-            corrections[start:stop] = corrections[right if left < 0 else left] if known.any() else 0.0
-            continue
-        span = float(right - left)
+        ends = [
+            corrections[left] if left >= 0 else corrections[right] * _PLACE,
+            corrections[right] if right < len(known) else corrections[left] * _PLACE,
+        ]
         slopes = [
             (corrections[left] - corrections[left - 1]) if left > 0 and known[left - 1] else np.zeros(6),
             (corrections[right + 1] - corrections[right])
             if right + 1 < len(known) and known[right + 1]
             else np.zeros(6),
         ]
-        since = (np.arange(start, stop) - left)[:, None].astype(float)
+        first = left if left >= 0 else min(left, right - usual)
+        last = right if right < len(known) else max(right, left + usual)
+        span = last - first
+        since = (np.arange(start, stop) - first)[:, None].astype(float)
         blend = smooth(since / span)
         corrections[start:stop] = (
-            (1 - blend) * corrections[left]
-            + blend * corrections[right]
+            (1 - blend) * ends[0]
+            + blend * ends[1]
             + slopes[0] * _fading(since, min(fade, span / 2))
             - slopes[1] * _fading(span - since, min(fade, span / 2))
         )
+
+
+_PLACE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 1.0])
+"""What of a correction is the place on the floor."""
+
+
+def _usual_swing(known: Bool[Array, "frames"]) -> float:
+    """Frames that a swing takes."""
+    return max(1.0, float(np.median([run.stop - run.start for run in signals.runs(known) if not run.value] or [1])))
 
 
 def _fading(since: Array, fade: float) -> Array:
@@ -192,22 +245,47 @@ def _fading(since: Array, fade: float) -> Array:
     return since * np.maximum(1 - since / fade, 0.0) ** 2
 
 
-def _clear(ankles: Array, turned: Array, ball: Array, known: Array) -> Float[Array, "frames 3"]:
+def _clear(
+    ankles: Float[Array, "frames 3"],
+    turned: Float[Array, "frames 4"],
+    ball: Float[Array, "3"],
+    known: Bool[Array, "frames"],
+) -> Float[Array, "frames 3"]:
     """A swinging foot lifted where its heel or ball would brush the floor."""
     heel, sole = (quat.rotate(turned, point)[:, 1] for point in (HEEL, ball))
     missing = np.maximum(CLEARANCE - (ankles[:, 1] + np.minimum(heel, sole - SOLE)), 0.0)
+    under = np.maximum(missing - CLEARANCE, 0.0)
+    usual = _usual_swing(known)
     for value, start, stop in signals.runs(known):
-        if not value and start > 0 and stop < len(known):
-            u = (np.arange(start, stop) - start + 1) / (stop - start + 1)
-            need = float((missing[start:stop] * np.minimum(1.0, 3 * np.sin(np.pi * u))).max())
-            ankles[start:stop, 1] += need * np.sin(np.pi * u) ** 2
+        if value:
+            continue
+        whole = stop - start if start > 0 and stop < len(known) else max(usual, stop - start)
+        frames = np.arange(start, stop)
+        since = (frames - start + 1) / (whole + 1) if start > 0 else np.ones(len(frames))
+        left = (stop - frames) / (whole + 1) if stop < len(known) else np.ones(len(frames))
+        lifted = smooth(since / RISE) * smooth(left / RISE)
+        need = np.maximum(missing[start:stop] * lifted, under[start:stop] / np.maximum(lifted, 0.2))
+        ankles[start:stop, 1] += need.max() * lifted
     return ankles
 
 
-def _toes_flat(known: Array) -> Float[Array, "frames"]:
+def _toe_bend(
+    turned: Float[Array, "frames 4"],
+    balls: Float[Array, "frames"],
+    tip: Float[Array, "3"],
+    known: Bool[Array, "frames"],
+) -> Float[Array, "frames"]:
+    """How far toes are bent up against the foot: as flat as they lie, and so far that they keep above the floor."""
+    heel_up = np.arcsin(np.clip(-_elevation(turned), 0.0, 1.0))
+    long, low = np.hypot(tip[1], tip[2]), np.arctan2(-tip[1], tip[2])
+    steepest = np.arcsin(np.clip((balls - SOLE - tip[1]) / long, -1.0, 1.0)) - low
+    return np.maximum(heel_up * _toes_flat(known), heel_up - steepest)
+
+
+def _toes_flat(known: Bool[Array, "frames"]) -> Float[Array, "frames"]:
     """Toes lie on the floor while the foot stands, and follow the foot in the swing."""
     out = np.ones(len(known))
-    usual = max(1.0, float(np.median([r.stop - r.start for r in signals.runs(known) if not r.value] or [1])))
+    usual = _usual_swing(known)
     for value, start, stop in signals.runs(known):
         if not value:
             frames, whole = np.arange(start, stop), max(usual, stop - start)
