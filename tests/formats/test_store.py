@@ -14,6 +14,7 @@ from stridecast.errors import DatabaseFileError, FileError
 from stridecast.formats import files, store
 from stridecast.formats.store import as_stored, load_database, save_database
 from stridecast.formats.tensors import read_tensors, write_tensors
+from stridecast.model.annotation import COLUMNS
 from stridecast.model.database import MotionDatabase
 from stridecast.synthesis.walker import Walker
 
@@ -33,6 +34,7 @@ def same(a: MotionDatabase, b: MotionDatabase) -> bool:
         for name in ("parents", "offsets", "end_joints", "end_offsets")
     )
     rest = (a.frame_rate, a.groups, a.takes, a.bounds_method) == (b.frame_rate, b.groups, b.takes, b.bounds_method)
+    rest &= all(np.array_equal(getattr(a.annotations, name), getattr(b.annotations, name)) for name in COLUMNS)
     return tables and body and arrays and rest and np.array_equal(a.references, b.references)
 
 
@@ -82,7 +84,7 @@ def test_header_names_format_and_version(stored):
         header = json.loads(file.metadata()["stridecast"])
         assert file.get_tensor("examples.features").dtype == np.float32
     assert header["format"] == "stridecast motion database"
-    assert header["version"] == 1
+    assert header["version"] == 2
 
 
 def test_unknown_entries_of_the_header_are_ignored(formula_database, stored):
@@ -131,8 +133,35 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path):
 
 def test_a_newer_version_is_refused_with_what_to_do(stored):
     changed(stored, version=7)
-    with pytest.raises(DatabaseFileError, match=r"version 7.*up to version 1.*upgrade"):
+    with pytest.raises(DatabaseFileError, match=r"version 7.*up to version 2.*upgrade"):
         load_database(stored)
+
+
+def test_a_file_of_version_1_is_annotated_when_it_is_read(formula_database, stored):
+    header, _ = read_tensors(stored, store.FORMAT, store.VERSION)
+    takes = [{name: value for name, value in take.items() if name != "annotation"} for take in header["takes"]]
+    changed(stored, version=1, takes=takes, **{f"annotations__{name}": None for name in COLUMNS})
+    old = load_database(stored)
+    for name in COLUMNS:
+        np.testing.assert_allclose(
+            getattr(old.annotations, name), getattr(formula_database.annotations, name), atol=1e-4, err_msg=name
+        )
+    for take, known in zip(old.takes, formula_database.takes, strict=True):
+        assert take.annotation.statuses == known.annotation.statuses
+        assert take.annotation.cycle == 0.0
+
+
+def test_annotations_that_do_not_fit_are_refused(formula_database, stored, unchecked):
+    whole = stored.read_bytes()
+    for wrong, says in (
+        (formula_database.annotations.style[:-1], "annotation 'style' is damaged"),
+        (np.full_like(formula_database.annotations.style, np.nan), "annotation 'style' is damaged"),
+        (None, "annotations.style.* is missing"),
+    ):
+        stored.write_bytes(whole)
+        changed(stored, annotations__style=wrong)
+        with pytest.raises(DatabaseFileError, match=says):
+            load_database(stored)
 
 
 def test_entries_that_are_missing_are_named(stored):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import asdict
 from itertools import pairwise
 
 import numpy as np
@@ -60,6 +61,10 @@ def as_json(database: MotionDatabase) -> dict[str, object]:
         "made_up": made_up(database.groups),
         "assumed": {group.name: list(group.bounds.assumed) for group in database.groups if group.bounds.assumed},
         "coverage": {"speed": list(SPEEDS), "turn_deg_per_s": list(TURNS), "examples": grid.tolist()},
+        "styles": {
+            name: _style_counts(database, name) for name in dict.fromkeys(group.motion for group in database.groups)
+        },
+        "annotations": [{"take": take.name, **asdict(take.annotation)} for take in database.takes if take.annotation],
     }
 
 
@@ -87,6 +92,11 @@ def tell(database: MotionDatabase, console: Console) -> None:
     console.print("strings: " + ", ".join(f"{string} {count}" for string, count in strings.most_common()))
     console.print(_coverage(database))
     console.print(_people(database))
+    console.print(_styles(database))
+    cycles = [take.annotation.cycle for take in database.takes if take.annotation and take.annotation.cycle]
+    if cycles:
+        number = sum(take.annotation.cycles for take in database.takes if take.annotation)
+        console.print(f"{number} cycles in {len(cycles)} takes, of {min(cycles):.2f} to {max(cycles):.2f} s")
     radius = _turning_radius(database)
     if radius is not None:
         console.print(f"tightest turn walking at {WALKING_SPEED} m/s: radius {radius:.2f} m")
@@ -165,6 +175,27 @@ def _people(database: MotionDatabase) -> Table:
         figures = len(takes), f"{sum(t.seconds for t in takes):.0f}", sum(t.segments for t in takes)
         table.add_row(escape(subject), *map(str, figures))
     return table
+
+
+def _styles(database: MotionDatabase) -> Table:
+    """Takes and what they show."""
+    table = Table("style of examples", *_STYLES, title_justify="left")
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for motion in dict.fromkeys(group.motion for group in database.groups):
+        table.add_row(motion, *[str(count) if count else "·" for count in _style_counts(database, motion).values()])
+    return table
+
+
+_STYLES = {"gloomy": (-1.0, -0.35), "neutral": (-0.35, 0.35), "brisk": (0.35, 1.0)}
+"""Words for styles, and the scores between which they are used."""
+
+
+def _style_counts(database: MotionDatabase, motion: str) -> dict[str, int]:
+    """Count the examples of a motion in each style."""
+    rows = np.repeat([group.motion == motion for group in database.groups], [g.count for g in database.groups])
+    scores = database.annotations.style[rows]
+    return {name: int(((scores >= low) & (scores < high)).sum()) for name, (low, high) in _STYLES.items()}
 
 
 def _turning_radius(database: MotionDatabase) -> float | None:

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from stridecast.analysis.bounds import LEAST, SteeringSamples, learn_cyclic, learn_transition
 from stridecast.analysis.events import HARD
 from stridecast.analysis.take import TakeAnalysis
+from stridecast.database.annotation import annotate, annotate_takes
 from stridecast.errors import TakeError
 from stridecast.geometry import ground
 from stridecast.geometry import quaternions as quat
@@ -106,13 +107,17 @@ def assemble(
                 tables[table].append(row)
     examples = Examples(**{table: np.array(rows) for table, rows in tables.items()})
     skeleton = analysed[0].analysis.motion.skeleton
+    annotations = annotate(skeleton, references, groups, examples)
+    analyses = {a.take: a.analysis for a in analysed if not a.mirrored}
+    accounted = _account(takes, usable, reasons)
     return MotionDatabase(
         skeleton=skeleton,
         frame_rate=frame_rate,
         groups=tuple(groups),
         examples=examples,
         references=references,
-        takes=_account(takes, usable, reasons),
+        takes=annotate_takes(accounted, groups, examples, annotations, analyses),
+        annotations=annotations,
         bounds_method=bounds_method,
     )
 

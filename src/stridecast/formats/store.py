@@ -9,16 +9,22 @@ from typing import Any
 
 import numpy as np
 
+from stridecast.database.annotation import annotate, annotate_takes
 from stridecast.errors import DatabaseFileError, InputError
 from stridecast.formats.tensors import Tensors, pack_skeleton, read_tensors, unpack_skeleton, write_tensors
+from stridecast.model.annotation import COLUMNS, Annotations, TakeAnnotation
 from stridecast.model.bounds import SteeringBounds
 from stridecast.model.database import Examples, MotionDatabase, Take
 from stridecast.model.group import MotionGroup
 from stridecast.model.segment import MOTIONS
 
 FORMAT = "stridecast motion database"
-VERSION = 1
-"""Version of the format; it grows when older code could no longer read what newer code writes."""
+VERSION = 2
+"""Version of the format; it grows when older code could no longer read what newer code writes.
+
+1. Without annotations; they are made when such a file is read, all but the cycles of takes.
+2. With annotations of examples and takes.
+"""
 
 _TABLES = {
     "features": np.float32,
@@ -60,6 +66,7 @@ def save_database(database: MotionDatabase, path: str | Path) -> None:
     }
     tensors["references"] = database.references
     tensors |= {f"examples.{name}": getattr(database.examples, name).astype(kind) for name, kind in _TABLES.items()}
+    tensors |= {f"annotations.{name}": getattr(database.annotations, name) for name in COLUMNS}
     write_tensors(path, header, tensors)
 
 
@@ -94,17 +101,32 @@ def as_stored(database: MotionDatabase) -> MotionDatabase:
 
 
 def _unpack(header: Mapping[str, Any], tensors: Tensors) -> MotionDatabase:
+    skeleton = unpack_skeleton(header["skeleton"], tensors)
+    groups = tuple(_group(row) for row in header["groups"])
+    examples = Examples(**{name: _table(tensors, name) for name in _TABLES})
+    takes = tuple(_take(row) for row in header["takes"])
+    if int(header["version"]) < 2:
+        annotations = annotate(skeleton, tensors["references"], groups, examples)
+        takes = annotate_takes(takes, groups, examples, annotations, {})
+    else:
+        annotations = Annotations(**{name: tensors[f"annotations.{name}"] for name in COLUMNS})
     return MotionDatabase(
-        skeleton=unpack_skeleton(header["skeleton"], tensors),
+        skeleton=skeleton,
         frame_rate=float(header["frame_rate"]),
-        groups=tuple(_group(row) for row in header["groups"]),
-        examples=Examples(**{name: _table(tensors, name) for name in _TABLES}),
+        groups=groups,
+        examples=examples,
         references=tensors["references"],
-        takes=tuple(
-            Take(**{**row, "left_out": tuple(row["left_out"]), "notes": tuple(row["notes"])}) for row in header["takes"]
-        ),
+        takes=takes,
+        annotations=annotations,
         bounds_method=str(header["bounds_method"]),
     )
+
+
+def _take(row: Mapping[str, Any]) -> Take:
+    told = row.get("annotation")
+    annotation = None if told is None else TakeAnnotation(**{**told, "statuses": tuple(told["statuses"])})
+    lists = {name: tuple(row[name]) for name in ("left_out", "notes")}
+    return Take(**{**row, **lists, "annotation": annotation})
 
 
 def _table(tensors: Tensors, name: str) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from stridecast.errors import DatabaseError
+from stridecast.model.annotation import Annotations, TakeAnnotation
 from stridecast.model.group import MotionGroup
 from stridecast.model.skeleton import Skeleton
 
@@ -28,7 +29,8 @@ ROWS = INTERVALS + 1 + 2 * MARGIN
 class Take:
     """Where examples come from, and what became of the take.
 
-    ``left_out`` says why nothing (or, with ``segments`` above zero, why not everything) of it was used.
+    ``left_out`` says why nothing (or, with ``segments`` above zero, why not everything) of it was used; ``annotation``
+    is what it shows, none where nothing was used.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Take:
     segments: int
     left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    annotation: TakeAnnotation | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,6 +117,8 @@ class MotionDatabase:
         Rotation of each joint but the root about which its rotation vectors are written, ``w x y z``.
     takes
         Every take that was offered, used or left out.
+    annotations
+        What each example shows: velocity, turn, style.
     bounds_method
         How bounds were learned, ``balanced`` or ``paper``.
     """
@@ -124,6 +129,7 @@ class MotionDatabase:
     examples: Examples
     references: Float[Array, "bones 4"]
     takes: tuple[Take, ...]
+    annotations: Annotations
     bounds_method: str = "balanced"
 
     def __post_init__(self) -> None:
@@ -136,6 +142,8 @@ class MotionDatabase:
             raise DatabaseError(f"a skeleton of {joints} joints needs {width} features and {joints - 1} references")
         if sum(g.count for g in self.groups) != len(self.examples.durations):
             raise DatabaseError("groups and examples differ in number")
+        if len(self.annotations) != len(self.examples.durations):
+            raise DatabaseError("annotations and examples differ in number")
         if not (np.isfinite(self.frame_rate) and 10 <= self.frame_rate <= 240):
             raise DatabaseError(f"the frame rate must lie between 10 and 240 Hz, not at {self.frame_rate}")
 
