@@ -10,6 +10,8 @@
         ├── MotionError              a motion that no person made (broken numbers, jumps)
         ├── TakeError                a take that cannot be learned from, with the reason
         ├── DatabaseError            a request that the database cannot answer
+        ├── SceneError               a scene or behavior that makes no sense, with the place in it
+        ├── PathError                no way through a scene, with what is in the way
         ├── DownloadError            a file on the web that does not come, with its address
         └── WishError                a point, force or motion name the walker rejects; its state is untouched
 
@@ -69,6 +71,14 @@ class DatabaseError(InputError):
 
 class DownloadError(InputError):
     """A file on the web that does not come, or comes with another content."""
+
+
+class SceneError(InputError):
+    """A scene or behavior that makes no sense: the message names the part of it."""
+
+
+class PathError(InputError):
+    """There is no way through a scene: the message names what is in the way."""
 
 
 class WishError(InputError):

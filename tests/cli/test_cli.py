@@ -209,18 +209,40 @@ def test_points_are_followed(database, points, tmp_path):
     assert np.allclose(motion.root_positions[:, 2], [float(row["pelvis_z"]) for row in rows], atol=1e-6)
 
 
-def test_curves_and_paths_are_followed(database, tmp_path):
+def test_curves_are_followed(database, tmp_path):
+    out = tmp_path / "out.bvh"
+    result = call(
+        "walk", database, "--curve", "line:2", "-o", out, "--json", "--speed", 1.0, "--rate", 60, "--half-life", 0.3
+    )
+    told = json.loads(result.stdout)
+    assert told["frame_rate"] == 60
+    assert 0.5 < told["metres"] < 3.2  # the point stops at once, a body does not
+    assert told["output"] == str(out)
+    assert told["trace"] is None
+    assert "way" not in told
+
+
+def test_paths_are_planned_and_kept(tmp_path):
     out, path = tmp_path / "out.bvh", tmp_path / "path.csv"
-    path.write_text("x,z\n0,0\n0,2\n")
-    lines = []
-    for way in (["--curve", "line:2"], ["--path", path]):
-        result = call("walk", database, *way, "-o", out, "--json", "--speed", 1.0, "--rate", 60, "--half-life", 0.3)
-        lines.append(json.loads(result.stdout))
-    assert lines[0] == lines[1]
-    assert lines[0]["frame_rate"] == 60
-    assert 0.5 < lines[0]["metres"] < 3.2  # the point stops at once, a body does not
-    assert lines[0]["output"] == str(out)
-    assert lines[0]["trace"] is None
+    path.write_text("x,z\n0,0\n0,4\n")
+    told = json.loads(call("walk", "--path", path, "-o", out, "--json", "--speed", 1.0).stdout)
+    assert told["way"] == pytest.approx(4.0)
+    assert told["error_max"] < 0.05
+    assert told["arrived"] is True
+    assert told["slowed"] == []
+    assert "4.0 m of way, kept within 0" in call("walk", "--path", path, "-o", out).stdout
+
+
+def test_scenes_are_walked(tmp_path):
+    out, scene = tmp_path / "out.bvh", tmp_path / "scene.yaml"
+    scene.write_text("start: [0, 0]\ngoals: [[0, 6]]\nobstacles: [{name: tree, center: [0.1, 3], radius: 0.4}]\n")
+    told = json.loads(call("walk", "--scene", scene, "-o", out, "--json", "--size", "lively").stdout)
+    assert told["way"] > 6.05
+    assert told["error_max"] < 0.1
+    scene.write_text("start: [0, 3]\ngoals: [[0, 6]]\nobstacles: [{name: tree, center: [0.1, 3], radius: 0.4}]\n")
+    assert "tree" in refused("walk", "--scene", scene, "-o", out)
+    scene.write_text("start: [0, 0]\ngoals: [[0, 6]]\nobstacles: [{name: tree, center: [0.1, 3], radius: -1}]\n")
+    assert "scene.yaml" in refused("walk", "--scene", scene, "-o", out)
 
 
 def test_usual_speeds_belong_to_the_motion(database, tmp_path):
@@ -241,7 +263,11 @@ def test_a_walk_that_cannot_be_is_refused(database, points, tmp_path):
     out = tmp_path / "out.bvh"
     bad = tmp_path / "bad.csv"
     for arguments, says in [
-        ([], "exactly one of --input, --curve and --path"),
+        ([], "exactly one of --input, --curve, --path and --scene"),
+        (["--scene", points, "--speed", 1], "the scene's behavior says how to go"),
+        (["--path", points, "--half-life", 0.2], "what is planned needs no spring"),
+        (["--path", points, "--motion", "stand"], "nobody stands along a path"),
+        (["--curve", "line", "--size", "huge"], "no size 'huge' of movement; there are calm, neutral"),
         (["--curve", "line", "--input", points], "exactly one of"),
         (["--input", points, "--speed", 1], "--speed goes with --curve and --path"),
         (["--curve", "spiral:3"], "no curve 'spiral'; there are line:6"),

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from stridecast.cli import build, fetch, samples, show, walk
+from stridecast.cli import build, fetch, mine, samples, show, walk
 from stridecast.errors import InputError
 
 
@@ -32,6 +32,7 @@ app = typer.Typer(
 )
 app.command("build")(build.build)
 app.command("show")(show.show)
+app.command("mine")(mine.mine)
 app.command("walk")(walk.walk)
 app.command("samples")(samples.samples)
 app.command("fetch")(fetch.fetch)

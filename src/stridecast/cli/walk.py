@@ -1,21 +1,32 @@
-"""``stridecast walk``: let a character follow points, a curve or a path."""
+"""``stridecast walk``: let a character follow points or a curve, or go along a path or through a scene."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from stridecast.cli.databases import Database, open_database
 
 if TYPE_CHECKING:
+    from stridecast.model.database import MotionDatabase
+    from stridecast.model.scene import Scene
+    from stridecast.paths.follow import PathWalk
+    from stridecast.steering.force import SteeringGains
     from stridecast.synthesis.journey import Journey, PointStream
+
+    Tell = Callable[[str, int, int], None]
 
 SPEEDS = {"stand": 1.3, "walk": 1.3, "run": 3.0}
 """Usual speed along curves and paths, m/s."""
 
 OUTPUTS = (".bvh",)
+
+SLOWED_SHOWN = 5
+"""So many places are told at which a plan is slower than asked for."""
 
 
 def walk(
@@ -30,15 +41,22 @@ def walk(
         str | None,
         typer.Option(metavar="NAME:SIZE", help="Curve to follow: line:6, circle:3, eight:2 or square:5 (metres)."),
     ] = None,
-    path: Annotated[Path | None, typer.Option(metavar="PATH.csv", help="Path to follow: x,z.")] = None,
+    path: Annotated[Path | None, typer.Option(metavar="PATH.csv", help="Path to go along, planned ahead: x,z.")] = None,
+    scene: Annotated[
+        Path | None, typer.Option(metavar="SCENE.yaml", help="Scene to go through: roads, obstacles, start, goals.")
+    ] = None,
     trace: Annotated[
         Path | None, typer.Option(metavar="TRACE.csv", help="Also write what happened in every frame.")
     ] = None,
     motion: Annotated[
-        str, typer.Option(metavar="stand|walk|run", help="Motion where the input does not name one.")
-    ] = "walk",
+        str | None, typer.Option(metavar="stand|walk|run", help="Motion where the input does not name one; else walk.")
+    ] = None,
     speed: Annotated[
         float | None, typer.Option(metavar="M_PER_S", help="Along a curve or path; else 1.3 to walk, 3 to run.")
+    ] = None,
+    size: Annotated[
+        str | None,
+        typer.Option(metavar="calm|neutral|lively|exaggerated", help="Size of movement; else that of the scene."),
     ] = None,
     subject: Annotated[str | None, typer.Option(help="Move in the manner of this person of the database.")] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Frames a second; else the database's.")] = None,
@@ -51,89 +69,180 @@ def walk(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
-    """Let a character follow points, a curve or a path, and write its motion.
+    """Let a character follow points or a curve, or go along a path or through a scene, and write its motion.
 
-    Name one of --input, --curve and --path.
+    Name one of --input, --curve, --path and --scene. Points and curves are followed as if by hand; the speed along a
+    path or through a scene is planned ahead, so that its shape is kept.
     """
-    from stridecast.errors import FileError, InputError
+    from stridecast.errors import FileError
 
-    if sum(given is not None for given in (points, curve, path)) != 1:
-        raise InputError("name exactly one of --input, --curve and --path")
-    if points is not None and speed is not None:
-        raise InputError("--speed goes with --curve and --path; the points of --input carry their own times")
-    if motion not in SPEEDS:
-        raise InputError(f"there is no motion {motion!r}; there are {', '.join(SPEEDS)}")
-    if trace is not None and trace.absolute() in {p.absolute() for p in (output, points, path, database) if p}:
+    _check(points, curve, path, scene, motion, speed, half_life, damping_ratio)
+    ways = (output, points, path, scene, database)
+    if trace is not None and trace.absolute() in {p.absolute() for p in ways if p}:
         raise FileError("the trace would overwrite another file of this walk", path=trace)
 
     from stridecast.cli import screen
     from stridecast.formats.bvh import write_bvh
     from stridecast.formats.files import check_place, replacing
     from stridecast.formats.trace import trace_text
-    from stridecast.steering.force import SteeringGains
-    from stridecast.synthesis.journey import follow
 
     if output.suffix.lower() not in OUTPUTS:
         raise FileError(f"motion is written as {', '.join(f'*{s}' for s in OUTPUTS)}", path=output)
     for place in (output, trace):
         if place is not None:
             check_place(place)
-    gains = SteeringGains(
-        **{
-            name: value
-            for name, value in (("half_life", half_life), ("damping_ratio", damping_ratio))
-            if value is not None
-        }
-    )
-    stream = _stream(points, curve, path, motion, SPEEDS[motion] if speed is None else speed)
-    learned = open_database(database, quiet=quiet)
-    with screen.progress(quiet, {"walk": f"{motion}ing" if motion != "run" else "running"}) as progress:
-        journey = follow(
-            learned,
-            stream,
-            subject=subject,
-            gains=gains,
-            frame_rate=rate,
-            progress=lambda done, total: progress("walk", done, total),
-        )
+    how = {"subject": subject, "frame_rate": rate, "size": size}
+    walked: PathWalk | None = None
+    words = {"way": "finding a way", "walk": "walking"}
+    if path is not None or scene is not None:
+        task = _scene(scene) if scene is not None else _task(path, motion, speed)
+        learned = open_database(database, quiet=quiet)
+        with screen.progress(quiet, words) as progress:
+            walked = _planned(learned, task, path, how, progress)
+        journey = walked.journey
+    else:
+        gains = _gains(half_life, damping_ratio)
+        stream = _stream(points, curve, motion or "walk", speed)
+        learned = open_database(database, quiet=quiet)
+        with screen.progress(quiet, words) as progress:
+            journey = _followed(learned, stream, gains, how, progress)
     if trace is None:
         write_bvh(output, journey.motion)
     else:
         with replacing(trace) as file:  # takes its place only once the motion has been written too
             file.write(trace_text(journey).encode())
             write_bvh(output, journey.motion)
-    summary = _summary(journey, output, trace)
+    summary = _summary(journey, walked, output, trace)
     if as_json:
         screen.print_json(summary)
     elif not quiet:
         said = "{frames} frames, {seconds:.1f} s, {metres:.1f} m, at most {fastest:.2f} m/s".format_map(summary)
         made_up = f", {journey.made_up} transitions made up" if journey.made_up else ""
         screen.out.print(f"{said}{made_up}: [bold]{output}[/]" + (f", {trace}" if trace else ""))
+        if walked is not None:
+            _tell_plan(walked)
 
 
-def _stream(points: Path | None, curve: str | None, path: Path | None, motion: str, speed: float) -> PointStream:
+def _check(
+    points: Path | None,
+    curve: str | None,
+    path: Path | None,
+    scene: Path | None,
+    motion: str | None,
+    speed: float | None,
+    half_life: float | None,
+    damping_ratio: float | None,
+) -> None:
+    """Refuse options that do not go together."""
+    from stridecast.errors import InputError
+
+    if sum(given is not None for given in (points, curve, path, scene)) != 1:
+        raise InputError("name exactly one of --input, --curve, --path and --scene")
+    if points is not None and speed is not None:
+        raise InputError("--speed goes with --curve and --path; the points of --input carry their own times")
+    if scene is not None and (speed is not None or motion is not None):
+        raise InputError("--speed and --motion do not go with --scene; the scene's behavior says how to go")
+    if (path or scene) and (half_life is not None or damping_ratio is not None):
+        raise InputError("--half-life and --damping-ratio go with --input and --curve; what is planned needs no spring")
+    if motion is not None and motion not in SPEEDS:
+        raise InputError(f"there is no motion {motion!r}; there are {', '.join(SPEEDS)}")
+    if path is not None and motion == "stand":
+        raise InputError("nobody stands along a path; --motion is walk or run there")
+
+
+def _gains(half_life: float | None, damping_ratio: float | None) -> SteeringGains:
+    from stridecast.steering.force import SteeringGains
+
+    given = {"half_life": half_life, "damping_ratio": damping_ratio}
+    return SteeringGains(**{name: value for name, value in given.items() if value is not None})
+
+
+def _followed(
+    database: MotionDatabase, stream: PointStream, gains: SteeringGains, how: dict[str, Any], progress: Tell
+) -> Journey:
+    from stridecast.synthesis.journey import follow
+
+    return follow(database, stream, gains=gains, progress=lambda done, total: progress("walk", done, total), **how)
+
+
+def _scene(path: Path) -> Scene:
+    from stridecast.formats.scenes import load_scene
+
+    return load_scene(path)
+
+
+def _task(path: Path | None, motion: str | None, speed: float | None) -> Scene:
+    """Make a scene of a path: nothing but a start, a goal and a behavior."""
+    from stridecast.errors import FileError, SceneError
+    from stridecast.formats.points import read_path
+    from stridecast.model.scene import Behavior, Scene
+
+    way = read_path(path or "")
+    status = motion or "walk"
+    try:
+        behavior = Behavior(velocity=SPEEDS[status] if speed is None else speed, status=status)
+    except SceneError as error:
+        raise FileError(str(error), path=path) from None
+    return Scene(start=way[0], goals=way[-1:], behavior=behavior)
+
+
+def _planned(database: MotionDatabase, task: Scene, path: Path | None, how: dict[str, Any], progress: Tell) -> PathWalk:
+    """Go along a path, or find a way through a scene and go it."""
+    from stridecast.formats.points import read_path
+    from stridecast.paths.curve import Curve
+    from stridecast.paths.follow import walk_along, walk_scene
+
+    def walking(done: int, total: int) -> None:
+        progress("walk", done, total)
+
+    if path is not None:
+        curve = Curve.through(read_path(path))
+        return walk_along(database, curve, behavior=task.behavior, progress=walking, **how)
+    finding = lambda share: progress("way", round(100 * share), 100)  # noqa: E731
+    return walk_scene(database, task, finding=finding, progress=walking, **how)
+
+
+def _tell_plan(walked: PathWalk) -> None:
+    """Say how well the way was kept, and where it had to be slower than asked for."""
+    from stridecast.cli import screen
+
+    mean, most = 100 * walked.errors.mean(), 100 * walked.errors.max()
+    screen.out.print(f"{walked.curve.length:.1f} m of way, kept within {mean:.1f} cm on average, {most:.1f} cm at most")
+    for slow in walked.plan.slowed[:SLOWED_SHOWN]:
+        why = "for the bend" if slow.why == "bend" else "as nobody in the database is faster"
+        screen.out.print(
+            f"  {slow.start:.1f} to {slow.stop:.1f} m: {slow.planned:.2f} instead of {slow.wished:.2f} m/s {why}"
+        )
+    if len(walked.plan.slowed) > SLOWED_SHOWN:
+        screen.out.print(f"  and slower at {len(walked.plan.slowed) - SLOWED_SHOWN} more places")
+    if not walked.arrived:
+        screen.out.print("[yellow]it did not come to rest at the end[/]")
+
+
+def _stream(points: Path | None, curve: str | None, motion: str, speed: float | None) -> PointStream:
     """Make a stream of points of whatever was given."""
     import numpy as np
 
     from stridecast.errors import InputError
-    from stridecast.formats.points import LONGEST, read_path, read_points
+    from stridecast.formats.points import LONGEST, read_points
     from stridecast.steering.curves import named_curve
     from stridecast.synthesis.journey import stream_along
 
     if points is not None:
         return read_points(points, motion)
-    way = read_path(path) if path is not None else named_curve(curve or "")
+    pace = SPEEDS[motion] if speed is None else speed
+    way = named_curve(curve or "")
     length = float(np.linalg.norm(np.diff(way, axis=0), axis=-1).sum())
-    if speed > 0 and length / speed > LONGEST:
-        raise InputError(f"{length:.6g} m at {speed:g} m/s take more than two hours; go faster, or less far")
-    return stream_along(way, speed, motion=motion)
+    if pace > 0 and length / pace > LONGEST:
+        raise InputError(f"{length:.6g} m at {pace:g} m/s take more than two hours; go faster, or less far")
+    return stream_along(way, pace, motion=motion)
 
 
-def _summary(journey: Journey, output: Path, trace: Path | None) -> dict[str, object]:
+def _summary(journey: Journey, walked: PathWalk | None, output: Path, trace: Path | None) -> dict[str, object]:
     import numpy as np
 
     steps = np.linalg.norm(np.diff(journey.positions, axis=0), axis=-1)
-    return {
+    summary: dict[str, object] = {
         "output": str(output),
         "trace": None if trace is None else str(trace),
         "frame_rate": journey.motion.frame_rate,
@@ -143,3 +252,12 @@ def _summary(journey: Journey, output: Path, trace: Path | None) -> dict[str, ob
         "fastest": float(np.linalg.norm(journey.velocities, axis=-1).max()),
         "made_up": journey.made_up,
     }
+    if walked is not None:
+        summary |= {
+            "way": walked.curve.length,
+            "error_mean": float(walked.errors.mean()),
+            "error_max": float(walked.errors.max()),
+            "arrived": walked.arrived,
+            "slowed": [asdict(slow) for slow in walked.plan.slowed],
+        }
+    return summary

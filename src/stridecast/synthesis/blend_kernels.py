@@ -11,6 +11,9 @@ from stridecast.model.database import MARGIN
 from stridecast.synthesis.state import NEIGHBOURS, State
 from stridecast.synthesis.tables import Tables
 
+SIZE_HALF_LIFE = 0.15
+"""Half of a change of size is done after about this, seconds."""
+
 SEAM_HALF_LIFE = 0.12
 """Half of the difference at a boundary is gone after this, seconds."""
 
@@ -54,7 +57,7 @@ def seconds_per_generic(tables: Tables, state: State, c: int) -> float:
 
 @kernel
 def blended(tables: Tables, state: State, c: int, generic: float, out: np.ndarray) -> None:
-    """Weighted sum of the chosen examples' features at a generic time."""
+    """Weighted sum of the chosen examples' features at a generic time, and of what their size adds."""
     rows = tables.features.shape[1]
     i, u = row_of(generic, rows)
     b = spline_weights(u)
@@ -66,6 +69,29 @@ def blended(tables: Tables, state: State, c: int, generic: float, out: np.ndarra
             w0, w1, w2, w3 = w * b[0], w * b[1], w * b[2], w * b[3]
             for k in range(len(out)):
                 out[k] += w0 * f[i - 1, k] + w1 * f[i, k] + w2 * f[i + 1, k] + w3 * f[i + 2, k]
+    if state.size[c, 0] != 0.0:
+        enlarge(tables.larger, state.chosen[c], state.weights[c], state.size[c, 0], i, b, out)
+
+
+@kernel
+def enlarge(larger, chosen, weights, size, i, b, out):  # type: ignore[no-untyped-def]
+    """Add what a size adds to the chosen examples; single arrays, as handing over all tables would cost more."""
+    for n in range(NEIGHBOURS):
+        w = weights[n] * size
+        if w != 0.0:
+            more = larger[chosen[n]]
+            w0, w1, w2, w3 = w * b[0], w * b[1], w * b[2], w * b[3]
+            for k in range(len(out)):
+                out[k] += w0 * more[i - 1, k] + w1 * more[i, k] + w2 * more[i + 1, k] + w3 * more[i + 2, k]
+
+
+@kernel
+def change_size(size, fresh, dt):  # type: ignore[no-untyped-def]
+    """Let a size of movement come nearer to the one wanted, smoothly; somebody nobody has seen has it at once."""
+    gap, rate = decay(size[0] - size[2], size[1], SIZE_HALF_LIFE, dt)
+    if fresh or (abs(gap) < 1e-4 and abs(rate) < 1e-3):
+        gap, rate = 0.0, 0.0
+    size[0], size[1] = size[2] + gap, rate
 
 
 @kernel

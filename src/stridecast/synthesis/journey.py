@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from stridecast.geometry import ground
 from stridecast.geometry import quaternions as quat
 from stridecast.model.database import MotionDatabase
 from stridecast.model.motion import Motion
+from stridecast.model.pose import Pose
 from stridecast.steering.force import SteeringGains
 from stridecast.synthesis.walker import Walker
 
@@ -101,6 +102,7 @@ def follow(
     gains: SteeringGains | None = None,
     frame_rate: float | None = None,
     heading: float | None = None,
+    size: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Journey:
     """Let a character walk after a stream of points, frame by frame as it would on-line.
@@ -115,6 +117,8 @@ def follow(
         Where to go.
     heading
         Where it looks at first, radians, if that is to be something else.
+    size
+        Size of movement (see ``Walkers``).
     progress
         Called with frames done and frames in all, about once a second of the walk.
     """
@@ -123,7 +127,9 @@ def follow(
         way = stream.points - first
         leading = np.flatnonzero(np.linalg.norm(way, axis=-1) > LOOK)
         heading = float(ground.heading(way[leading[0]])) if len(leading) else 0.0
-    walker = Walker(database, first, heading, subject=subject, gains=gains, frame_rate=frame_rate)
+    walker = Walker(
+        database, first, heading, subject=subject, gains=gains, frame_rate=frame_rate, size=size or "neutral"
+    )
     rate = walker.frame_rate
     times = stream.times[0] + np.arange(int((stream.times[-1] - stream.times[0]) * rate + 1e-6) + 1) / rate
     points, wanted = stream.at(times)
@@ -135,17 +141,24 @@ def follow(
             raise WishError(f"at {times[i]:.3f} s: {error}") from None
         if progress is not None and (i % int(rate) == 0 or i + 1 == len(times)):
             progress(i + 1, len(times))
+    return journey_of(walker, times, points, poses, subject=subject)
+
+
+def journey_of(
+    walker: Walker, times: Float[Array, "frames"], inputs: Array, poses: Sequence[Pose], *, subject: str | None = None
+) -> Journey:
+    """Put the poses of a walker together; ``inputs`` are the ground points it was meant to be at."""
     return Journey(
         motion=Motion(
-            skeleton=database.skeleton,
-            frame_rate=rate,
+            skeleton=walker.database.skeleton,
+            frame_rate=walker.frame_rate,
             root_positions=np.array([p.root_position for p in poses]),
             rotations=quat.continuous(np.array([p.rotations for p in poses])),
             name="walk",
             subject=subject or "",
         ),
         times=times,
-        inputs=points,
+        inputs=inputs,
         positions=np.array([p.vehicle.position for p in poses]),
         velocities=np.array([p.vehicle.velocity for p in poses]),
         accelerations=np.array([p.vehicle.acceleration for p in poses]),

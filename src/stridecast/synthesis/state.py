@@ -37,6 +37,8 @@ class State(NamedTuple):
     started: Array  # C, speed at the segment's first frame
     segments: Array  # C, segments begun so far
     made_up: Array  # C, transitions that had no example
+    # size of movement
+    size: Array  # C 3: share of what exaggerated movements add, how fast it changes, the share wanted
     # seams
     features: Array  # C D, of the last frame as shown; at first the pose to begin with
     before: Array  # C D, of the frame before
@@ -80,6 +82,7 @@ def make_state(count: int, tables: Tables) -> State:
         "weights": (NEIGHBOURS,),
         "generic": (),
         "started": (),
+        "size": (3,),
         "features": (width,),
         "before": (width,),
         "seam": (width,),

@@ -8,7 +8,14 @@ import numpy as np
 
 from stridecast.geometry.kernels import kernel
 from stridecast.steering.kernels import limit, pull
-from stridecast.synthesis.blend_kernels import blended, close_seam, open_seam, seconds_per_generic, show_features
+from stridecast.synthesis.blend_kernels import (
+    blended,
+    change_size,
+    close_seam,
+    open_seam,
+    seconds_per_generic,
+    show_features,
+)
 from stridecast.synthesis.choice_kernels import begin_segment
 from stridecast.synthesis.feet_kernels import plant_feet
 from stridecast.synthesis.pose_kernels import compose
@@ -17,6 +24,8 @@ from stridecast.synthesis.tables import Tables
 
 STAND, WALK, RUN = 0, 1, 2
 
+POINT, FORCE, PLAN = 0, 1, 2
+"""Kinds of wishes: a point to follow, a force, the acceleration of somebody who has planned the way."""
 SEEN_HALF_LIFE = 0.07
 """How the point moves is smoothed with this half-life, seconds."""
 
@@ -54,7 +63,8 @@ def step_block(
     state: State,
     points: np.ndarray,
     forces: np.ndarray,
-    by_force: np.ndarray,
+    kind: np.ndarray,
+    rests_in: np.ndarray,
     motions: np.ndarray,
     alpha: float,
     beta: float,
@@ -65,10 +75,12 @@ def step_block(
     """Advance characters ``first`` to ``last`` by one frame."""
     meant = np.empty(tables.features.shape[2])
     for c in range(first, last):
-        watch_point(state, points, by_force, c, dt)
-        request = motion_wanted(tables, state, points, forces, by_force, motions[c], alpha, beta, c)
-        begun = next_segment_if_due(tables, state, c, request, dt)
-        move_vehicle(tables, state, points, forces, by_force, request, alpha, beta, c, dt)
+        watch_point(state, points, kind, c, dt)
+        request = motion_wanted(tables, state, points, forces, kind, motions[c], alpha, beta, c)
+        begun = next_segment_if_due(tables, state, c, request, rests_in[c], dt)
+        move_vehicle(tables, state, points, forces, kind, rests_in[c], request, alpha, beta, c, dt)
+        if state.size[c, 0] != state.size[c, 2]:
+            change_size(state.size[c], state.fresh[c], dt)
         blended(tables, state, c, state.generic[c], meant)
         if begun and not state.fresh[c]:
             open_seam(tables, state, c, meant, dt)
@@ -80,9 +92,9 @@ def step_block(
 
 
 @kernel
-def watch_point(state: State, points: np.ndarray, by_force: np.ndarray, c: int, dt: float) -> None:
+def watch_point(state: State, points: np.ndarray, kind: np.ndarray, c: int, dt: float) -> None:
     """How the point moves, smoothed over a tenth of a second."""
-    if by_force[c]:
+    if kind[c] != POINT:
         return
     if state.fresh[c]:
         state.anchor[c, 0], state.anchor[c, 1] = state.position[c, 0], state.position[c, 1]
@@ -105,7 +117,7 @@ def motion_wanted(
     state: State,
     points: np.ndarray,
     forces: np.ndarray,
-    by_force: np.ndarray,
+    kind: np.ndarray,
     motion: int,
     alpha: float,
     beta: float,
@@ -115,7 +127,9 @@ def motion_wanted(
     if motion == STAND or state.fresh[c]:
         return STAND
     standing = tables.leads_to[state.group[c]] == STAND
-    if by_force[c]:
+    if kind[c] == PLAN:
+        return motion
+    if kind[c] == FORCE:
         force = math.hypot(forces[c, 0], forces[c, 1])
         return STAND if standing and force < WISH_TO_GO else motion
     away = math.hypot(points[c, 0] - state.position[c, 0], points[c, 1] - state.position[c, 1])
@@ -144,13 +158,13 @@ def stopping_way(tables: Tables, state: State, c: int) -> float:
 
 
 @kernel
-def next_segment_if_due(tables: Tables, state: State, c: int, request: int, dt: float) -> bool:
+def next_segment_if_due(tables: Tables, state: State, c: int, request: int, rests_in: float, dt: float) -> bool:
     """Let the segment run on by one frame; begin the next where it ends, or at once where standing is to end."""
     if state.fresh[c]:
         begin_segment(tables, state, c, request, 0.0)
         return True
     slope = seconds_per_generic(tables, state, c)
-    state.generic[c] += dt / slope * pace(tables, state, c, slope)
+    state.generic[c] += dt / slope * pace(tables, state, c, rests_in, slope)
     g = state.group[c]
     idle = tables.comes_from[g] == STAND and tables.leads_to[g] == STAND
     if state.generic[c] >= 1.0:
@@ -184,10 +198,11 @@ def eased(state: State, c: int, x: float, z: float, k: float, brake: float, jerk
 
 
 @kernel
-def pace(tables: Tables, state: State, c: int, slope: float) -> float:
+def pace(tables: Tables, state: State, c: int, rests_in: float, slope: float) -> float:
     """How fast a start or a stop plays: slower where its vehicle needs longer than the example to get going or to rest.
 
-    Three quarters of the greatest acceleration allowed is what it can count on, as it builds up and is taken back.
+    Three quarters of the greatest acceleration allowed is what it can count on, as it builds up and is taken back. A
+    plan says when it rests.
     """
     g = state.group[c]
     starts, stops = tables.comes_from[g] == STAND, tables.leads_to[g] == STAND
@@ -195,7 +210,9 @@ def pace(tables: Tables, state: State, c: int, slope: float) -> float:
         return 1.0
     speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
     left = (1.0 - min(state.generic[c], 1.0)) * slope
-    if stops:
+    if stops and rests_in < math.inf:
+        need = rests_in if tables.to_rest[g] else 0.0
+    elif stops:
         need = speed / max(-0.375 * (tables.tangential[g, 0, 0] + tables.tangential[g, 1, 0]), 0.1)
     else:
         need = (tables.speed[g, 1, 0] - speed) / max(
@@ -212,7 +229,8 @@ def move_vehicle(
     state: State,
     points: np.ndarray,
     forces: np.ndarray,
-    by_force: np.ndarray,
+    kind: np.ndarray,
+    rests_in: float,
     request: int,
     alpha: float,
     beta: float,
@@ -233,7 +251,10 @@ def move_vehicle(
     fastest = (1.0 - u) * max(tables.speed[g, 0, 1], state.started[c]) + u * tables.speed[g, 1, 1]
 
     # The wish, in the vehicle's frame.
-    if by_force[c] and request != STAND:
+    if kind[c] == PLAN and (tables.comes_from[g] != STAND or tables.leads_to[g] != STAND):
+        wish_t = forces[c, 0] * sine + forces[c, 1] * cosine
+        wish_l = forces[c, 0] * cosine - forces[c, 1] * sine
+    elif kind[c] == FORCE and request != STAND:
         wish_t = forces[c, 0] * sine + forces[c, 1] * cosine
         wish_l = forces[c, 0] * cosine - forces[c, 1] * sine
         if speed < GOING:
@@ -245,7 +266,7 @@ def move_vehicle(
             wish_t = -speed / dt
         else:
             slope = seconds_per_generic(tables, state, c)
-            left = max((1.0 - u) * slope / pace(tables, state, c, slope), 2.0 * dt)
+            left = max((1.0 - u) * slope / pace(tables, state, c, rests_in, slope), 2.0 * dt)
             wish_t = -2.0 * speed / left if speed > 0.02 else -speed / dt
         wish_l = 0.0
     else:

@@ -32,6 +32,7 @@ class Tables(NamedTuple):
 
     # examples
     features: Array  # E R D
+    larger: Array  # E R D, what exaggerated movements add, single precision; none while nobody asks for another size
     times: Array  # E R
     parameters: Array  # E 3, speed at the first frame, mean tangential and lateral acceleration
     durations: Array  # E
@@ -47,6 +48,7 @@ class Tables(NamedTuple):
     keys: Array  # G MOST_KEYS, padded with 2
     planted: Array  # G MOST_KEYS+1 2
     from_rest: Array  # G, begins in standing
+    to_rest: Array  # G, ends in it
     entry_speed: Array  # G 2
     jerk: Array  # G
     later_jerk: Array  # G, of the motion a group leads to if that is less
@@ -90,6 +92,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
     entry = np.array([_entry_speed(g, examples.parameters[g.rows][allowed[g.rows], 0]) for g in groups])
     return Tables(
         features=examples.features,
+        larger=np.zeros((0, *examples.features.shape[1:]), np.float32),
         times=examples.times,
         parameters=_parameters(database),
         durations=examples.durations,
@@ -104,6 +107,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         keys=np.array([list(g.keys) + [2.0] * (MOST_KEYS - len(g.keys)) for g in groups]),
         planted=np.array([_planted(g.string) for g in groups]),
         from_rest=np.array([g.start == "S" for g in groups]),
+        to_rest=np.array([g.stop == "S" for g in groups]),
         entry_speed=entry,
         jerk=np.array([g.bounds.jerk for g in groups]),
         later_jerk=np.array([_later_jerk(g, groups) for g in groups]),

@@ -13,11 +13,13 @@ from stridecast.errors import InputError, WishError
 from stridecast.geometry.kernels import is_compiled
 from stridecast.model.database import MotionDatabase
 from stridecast.model.pose import BoundsInForce, Pose, VehicleState
+from stridecast.model.scene import SIZES
 from stridecast.model.segment import MOTIONS
 from stridecast.steering.force import SteeringGains
 from stridecast.steering.kernels import JERK, LATERAL, SPEED, TANGENTIAL
+from stridecast.synthesis.sizes import AMOUNTS, enlargement
 from stridecast.synthesis.state import make_state
-from stridecast.synthesis.step_kernels import step_block
+from stridecast.synthesis.step_kernels import FORCE, PLAN, POINT, step_block
 from stridecast.synthesis.tables import make_tables
 
 Array = np.ndarray
@@ -58,6 +60,8 @@ class Walkers:
         Frames a second; the database's if left out.
     threads
         Threads that share the characters. The result does not depend on it.
+    size
+        Size of movement to begin with (see ``step``).
 
     Raises
     ------
@@ -77,6 +81,7 @@ class Walkers:
         gains: SteeringGains | None = None,
         frame_rate: float | None = None,
         threads: int = 1,
+        size: str | Sequence[str] = "neutral",
     ) -> None:
         places = np.array(positions, np.float64)
         if places.ndim != 2 or places.shape[1] != 2 or len(places) == 0:
@@ -104,9 +109,11 @@ class Walkers:
         self._state.heading[:] = looks
         self._points = places.copy()
         self._forces = np.zeros_like(places)
-        self._by_force = np.zeros(len(places), bool)
+        self._kind = np.full(len(places), POINT)
+        self._rests_in = np.full(len(places), np.inf)
         self._wanted = np.zeros(len(places), np.int64)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self._set_sizes(self._sizes_of(size))
 
     def __len__(self) -> int:
         return len(self._wanted)
@@ -126,9 +133,12 @@ class Walkers:
         points: Float[Array, "characters 2"] | None = None,
         *,
         forces: Float[Array, "characters 2"] | None = None,
+        accelerations: Float[Array, "characters 2"] | None = None,
+        rests_in: Float[Array, "characters"] | float = np.inf,
         motion: str | Sequence[str] = "walk",
+        size: str | Sequence[str] | None = None,
     ) -> Pose:
-        """Advance by one frame.
+        """Advance by one frame. Give one of points, forces and accelerations.
 
         Parameters
         ----------
@@ -136,35 +146,62 @@ class Walkers:
             Ground points to follow, metres.
         forces
             Instead of points: forces on a unit mass in the world, m/s2 (a joystick, sliders).
+        accelerations
+            Instead of points: what a plan wants, in the world, m/s2 (see ``paths.follow``).
+        rests_in
+            With accelerations: time until the plan comes to rest, seconds; stops begin and play so that they end then.
         motion
             ``stand``, ``walk`` or ``run``, one for all or one each; carried out at the next segment the graph allows.
             Beside a point that rests, a character comes to stand by itself.
+        size
+            How large movements are: ``calm``, ``neutral``, ``lively`` or ``exaggerated``, one for all or one each; as
+            before if left out. It changes smoothly, in about half a second.
 
         Raises
         ------
         WishError
-            Not exactly one of points and forces, wrong shape, numbers that are not finite, an unknown motion. Nothing
-            has changed then.
+            Not exactly one of points, forces and accelerations, wrong shape, numbers that are not finite, an unknown
+            motion or size. Nothing has changed then.
         """
-        self._take_wish(points, forces, motion)
+        sizes = None if size is None else self._sizes_of(size)
+        self._take_wish(points, forces, accelerations, rests_in, motion)
+        if sizes is not None:
+            self._set_sizes(sizes)
         self._advance()
         return self._pose()
 
-    def _take_wish(self, points: Array | None, forces: Array | None, motion: str | Sequence[str]) -> None:
+    def _take_wish(
+        self,
+        points: Array | None,
+        forces: Array | None,
+        accelerations: Array | None,
+        rests_in: Array | float,
+        motion: str | Sequence[str],
+    ) -> None:
         """Check a wish whole before any of it is stored."""
-        if (points is None) == (forces is None):
-            raise WishError("give either points or forces")
-        by_force = points is None
-        wish = np.asarray(forces if by_force else points, np.float64)
-        if wish.shape != self._points.shape:
-            raise WishError(
-                f"{'forces' if by_force else 'points'} must have shape {self._points.shape}, not {wish.shape}"
+        given = [
+            (kind, name, wish)
+            for kind, name, wish in (
+                (POINT, "points", points),
+                (FORCE, "forces", forces),
+                (PLAN, "accelerations", accelerations),
             )
+            if wish is not None
+        ]
+        if len(given) != 1:
+            raise WishError("give one of points, forces and accelerations")
+        kind, name, wish = given[0]
+        wish = np.asarray(wish, np.float64)
+        if wish.shape != self._points.shape:
+            raise WishError(f"{name} must have shape {self._points.shape}, not {wish.shape}")
         if not np.isfinite(wish).all():
             row = int(np.flatnonzero(~np.isfinite(wish).all(axis=1))[0])
             raise WishError(f"the wish of character {row} is {wish[row].tolist()}: finite numbers are wanted")
         if np.abs(wish).max() > FARTHEST:
             raise WishError(f"the wish lies further than {FARTHEST:.0e} from the origin")
+        rests = np.asarray(rests_in, np.float64)
+        if rests.shape not in ((), (len(self),)) or np.isnan(rests).any() or (rests < 0).any():
+            raise WishError("rests_in must be seconds from 0, one for all or one each")
         if isinstance(motion, str):
             wanted: int | list[int] = self._number_of(motion)
         else:
@@ -172,8 +209,25 @@ class Walkers:
                 raise WishError(f"{len(motion)} motions for {len(self)} characters")
             wanted = [self._number_of(name) for name in motion]
         self._wanted[:] = wanted
-        self._by_force[:] = by_force
-        (self._forces if by_force else self._points)[:] = wish
+        self._kind[:] = kind
+        self._rests_in[:] = rests if kind == PLAN else np.inf
+        (self._points if kind == POINT else self._forces)[:] = wish
+
+    def _sizes_of(self, size: str | Sequence[str]) -> list[float]:
+        names = [size] * len(self) if isinstance(size, str) else list(size)
+        if len(names) != len(self):
+            raise WishError(f"{len(names)} sizes for {len(self)} characters")
+        try:
+            return [AMOUNTS[name] for name in names]
+        except (KeyError, TypeError):
+            wrong = next(name for name in names if name not in SIZES)
+            raise WishError(f"there is no size {wrong!r} of movement; there are {', '.join(SIZES)}") from None
+
+    def _set_sizes(self, sizes: list[float]) -> None:
+        """Take sizes over; the first that is not neutral costs a second or two."""
+        if any(sizes) and not len(self._tables.larger):
+            self._tables = self._tables._replace(larger=enlargement(self.database).astype(np.float32))
+        self._state.size[:, 2] = sizes
 
     def _number_of(self, motion: str) -> int:
         try:
@@ -197,7 +251,8 @@ class Walkers:
             self._state,
             self._points,
             self._forces,
-            self._by_force,
+            self._kind,
+            self._rests_in,
             self._wanted,
             self.gains.alpha,
             self.gains.beta,
@@ -251,12 +306,13 @@ class Walker:
         subject: str | None = None,
         gains: SteeringGains | None = None,
         frame_rate: float | None = None,
+        size: str = "neutral",
     ) -> None:
         place = np.asarray(position, np.float64)
         if place.shape != (2,):
             raise InputError(f"a position is a ground point (x, z), not an array of shape {place.shape}")
         self._batch = Walkers(
-            database, place[None], float(heading), subject=subject, gains=gains, frame_rate=frame_rate
+            database, place[None], float(heading), subject=subject, gains=gains, frame_rate=frame_rate, size=size
         )
 
     @property
@@ -289,9 +345,14 @@ class Walker:
         point: Sequence[float] | Float[Array, "2"] | None = None,
         *,
         force: Sequence[float] | Float[Array, "2"] | None = None,
+        acceleration: Sequence[float] | Float[Array, "2"] | None = None,
+        rests_in: float = np.inf,
         motion: str = "walk",
+        size: str | None = None,
     ) -> Pose:
-        """Advance by one frame to a ground point ``(x, z)`` or by a force on a unit mass (m/s2); see ``Walkers.step``.
+        """Advance by one frame to a ground point ``(x, z)``, by a force on a unit mass or as a plan wants (m/s2).
+
+        See ``Walkers.step``.
 
         Raises
         ------
@@ -300,7 +361,14 @@ class Walker:
         """
         if not isinstance(motion, str):
             raise WishError(f"a motion is one of {', '.join(self.motions)}, not {motion!r}")
-        pose = self._batch.step(_row(point), forces=_row(force), motion=motion)
+        pose = self._batch.step(
+            _row(point),
+            forces=_row(force),
+            accelerations=_row(acceleration),
+            rests_in=rests_in,
+            motion=motion,
+            size=size,
+        )
         v, b = pose.vehicle, pose.bounds
         return Pose(
             root_position=pose.root_position[0],

@@ -1,0 +1,1 @@
+"""Scene and behavior to a curve and a plan of speeds."""
