@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stridecast.building.build import build
+    from stridecast.database.mining import Mined, mine
     from stridecast.errors import (
         DatabaseError,
         DatabaseFileError,
@@ -43,6 +44,8 @@ _HOME = {
     "build": "building.build",
     "sample_database": "samples.library",
     "fetch": "samples.recordings",
+    "mine": "database.mining",
+    "Mined": "database.mining",
     "load_database": "formats.store",
     "save_database": "formats.store",
     "load_motion": "formats.recordings",
@@ -73,6 +76,8 @@ __all__ = [  # noqa: RUF022
     "build",
     "sample_database",
     "fetch",
+    "mine",
+    "Mined",
     "load_database",
     "save_database",
     "load_motion",
