@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -21,7 +22,13 @@ from PIL import Image
 import stridecast as sc
 from stridecast.analysis.take import TakeAnalysis, analyse
 from stridecast.body import kinematics
-from stridecast.formats.picture import INPUT, PELVIS, VEHICLE, Camera, draw_body, write_picture
+from stridecast.formats.picture import INPUT, LEFT, PELVIS, RIGHT, VEHICLE, Camera, draw_body, write_picture
+from stridecast.formats.scenes import load_scene
+from stridecast.geometry import signals
+from stridecast.model.scene import Circle, Scene
+from stridecast.paths.curve import Curve
+from stridecast.paths.follow import walk_scene
+from stridecast.paths.generate import generate_path
 from stridecast.samples.adult import adult
 from stridecast.samples.corpus import Leg, Recipe, sample_take
 from stridecast.samples.performance import SampleTake, perform
@@ -45,13 +52,15 @@ def main() -> None:
     OUT.mkdir(exist_ok=True)
     from demo import course
 
-    write_picture(OUT / "walk.png", follow(database, course()), every=0.6)
+    write_picture(OUT / "walk.png", follow(sc.sample_database(), course()), every=0.6)
+    walked()
     trajectories(database)
     vehicle([analyse(sc.load_motion(path)) for path in take_files(folder, "16_27", "16_29", "16_37", "16_31")])
     bounds(folder, database)
     contacts([analyse(sc.load_motion(path)) for path in take_files(folder, "16_31", "16_33", "16_55", "127_04")])
     gait(folder)
     sample(folder)
+    scene()
 
 
 def take_files(folder: Path, *names: str) -> list[Path]:
@@ -68,6 +77,32 @@ def save(figure: Figure, name: str, colours: int | None = None) -> None:
         drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
         drawn.quantize(colours, dither=Image.Dither.NONE).save(OUT / name, optimize=True)
     print(f"wrote {OUT / name}")
+
+
+def walked() -> None:
+    """Figures 5, 7a and 7b of Baek, Jeong and Lee: ways through scenes, and the footprints of who walked them."""
+    figure = Figure(figsize=(13, 6.4), dpi=80, layout="constrained")
+    for axes, name in zip(figure.subplots(1, 2), ("road", "square"), strict=True):
+        scene = load_scene(HERE.parent / "examples" / "scenes" / f"{name}.yaml")
+        walk = walk_scene(sc.sample_database(), scene)
+        draw_scene(axes, scene)
+        axes.plot(*walk.curve.points.T, color=INPUT, lw=1)
+        axes.plot(*walk.journey.positions.T, color=VEHICLE, lw=0.8)
+        axes.plot(*walk.curve.controls.T, "o", color=INPUT, ms=4)
+        footprints(axes, walk.journey)
+        most = 100 * walk.errors.max()
+        axes.set_title(f"{name}: {walk.curve.length:.1f} m, at most {most:.1f} cm off the curve")
+    save(figure, "walked.png")
+
+
+def footprints(axes: Axes, journey: Journey) -> None:
+    """A stroke from ankle to toe in the middle of each contact."""
+    places = kinematics.pose(journey.motion).positions[..., [0, 2]]
+    for column, (side, colour) in enumerate((("left", LEFT), ("right", RIGHT))):
+        ankle, toe = (journey.motion.skeleton.joint(f"{side}_{part}") for part in ("foot", "toe"))
+        for value, start, stop in signals.runs(journey.planted[:, column]):
+            if value:
+                axes.plot(*places[(start + stop) // 2, [ankle, toe]].T, color=colour, lw=3)
 
 
 def trajectories(database: sc.MotionDatabase) -> None:
@@ -350,6 +385,42 @@ def sample_strips() -> Sequence[tuple[str, SampleTake, tuple[float, float, float
         ("stop", stop, (1.9, 4.0, 0.15), FROM_RIGHT, 0.04),
         ("walk to run\n1.4 to 3.5 m/s", run, (0.9, 2.6, 0.1), FROM_RIGHT, 0.04),
     )
+
+
+def scene() -> None:
+    """Figures 2 and 3 of Baek, Jeong and Lee: a scene, control points inserted one after the other, curves."""
+    figure = Figure(figsize=(13, 4.2), dpi=80, layout="constrained")
+    axes = figure.subplots(1, 4)
+    road, square = (load_scene(HERE.parent / "examples" / "scenes" / f"{name}.yaml") for name in ("road", "square"))
+    found = generate_path(road)
+    points = np.array([road.start, *(point for point, _ in found.inserted), road.goals[-1]])
+    first = Curve.hermite(points[[0, -1]], road.behavior), Curve.hermite(points[[0, 1, 2, -1]], road.behavior)
+    titles = ("a straight line", "two control points", "clear", "searched: goals in order")
+    curves = (*first, found.curve, generate_path(square).curve)
+    for panel, title, curve in zip(axes, titles, curves, strict=True):
+        draw_scene(panel, square if panel is axes[-1] else road)
+        panel.plot(*curve.points.T, color=VEHICLE, linewidth=1.5)
+        panel.plot(*curve.controls[1:-1].T, "o", color=INPUT, markersize=4)
+        panel.set_title(title)
+    save(figure, "scene.png")
+
+
+def draw_scene(axes: Axes, place: Scene) -> None:
+    """Roads and obstacles seen from above, start and goals."""
+    for road in place.roads:
+        strip = shapely.LineString(road.points).buffer(road.width / 2)
+        axes.fill(*strip.exterior.xy, color="#e2e8f0")
+    for obstacle in place.obstacles:
+        if isinstance(obstacle, Circle):
+            outline = np.array(shapely.Point(obstacle.center).buffer(obstacle.radius).exterior.coords)
+        else:
+            outline = obstacle.points
+        axes.fill(*outline.T, color="#a0aec0")
+    axes.plot(*place.start, "o", color="#2f855a", markersize=7)
+    axes.plot(*place.goals.T, "*", color="#c05621", markersize=10)
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set_xlabel("x, m")
+    axes.invert_xaxis()  # seen from above, +X is left of +Z
 
 
 if __name__ == "__main__":

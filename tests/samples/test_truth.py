@@ -32,10 +32,10 @@ OTHER = str.maketrans("LR", "RL")
 CUTS_OF_EACH, CUT = 5, 2.0
 """Every take is cut so often, at places drawn by chance, into pieces so long, seconds."""
 
-MIDDLE_OF_EVEN, MIDDLE_OF_CHANGING, MIDDLE_BESIDE_STANDING = 0.25, 0.5, 1.0
+MIDDLE_OF_EVEN, MIDDLE_OF_CHANGING, MIDDLE_BESIDE_STANDING = 0.3, 0.5, 1.0
 """How far from mid-stance a found one may be, radians of the stride: in even gait, in takes with starts, stops or
-changes of gait, and of a stance that begins or ends with standing, of which nobody can say when. Measured: 0.18, 0.32
-and 0.82."""
+changes of gait, and of a stance that begins or ends with standing, of which nobody can say when. Measured: 0.21, 0.38
+and 0.66."""
 
 
 def gait_of(name: str) -> str:
@@ -97,7 +97,7 @@ def beside_standing(analysis: TakeAnalysis, take: SampleTake) -> np.ndarray:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_vehicle_is_found(analyses, sample_takes, name):
-    """Measured: 0.4 to 4.7 mm to the side, 0.05 to 2.7 % of the speed, headings 0.001 to 0.02."""
+    """Measured: 0.5 to 4.9 mm to the side, 0.05 to 2.2 % of the speed, headings 0.001 to 0.021."""
     found, take = analyses[name], sample_takes[name]
     assert off_the_path(found, take).mean() < 0.010
     assert off_the_speed(found, take) < 0.03
@@ -106,7 +106,7 @@ def test_vehicle_is_found(analyses, sample_takes, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_contacts_are_found(analyses, sample_takes, name):
-    """Measured: 95.2 % (running in circles) to 100 %."""
+    """Measured: 96.3 % (running) to 100 %, walking 97 % and more."""
     assert right_contacts(analyses[name], sample_takes[name]) >= 0.95
 
 
@@ -240,7 +240,7 @@ def worst(cuts: list[Cut], what: str) -> str:
 
 
 def test_vehicle_of_two_seconds_cut_anywhere(cuts):
-    """Measured: 2.9 mm on average, 94 % of cuts below 10 mm, the worst 26 mm (gloomy and about-turns)."""
+    """Measured: 2.9 mm on average, 96 % of cuts below 10 mm, the worst 17 mm (right angles)."""
     path = np.array([cut.path for cut in cuts])
     assert len(path) == CUTS_OF_EACH * len(RECIPES) >= 150
     assert path.mean() < 0.005, worst(cuts, "path")
@@ -249,7 +249,7 @@ def test_vehicle_of_two_seconds_cut_anywhere(cuts):
 
 
 def test_speed_of_two_seconds_cut_anywhere(cuts):
-    """Measured: 1.2 % of the mean speed on average, the worst 6 to 9 % (stopping)."""
+    """Measured: 1.1 % of the mean speed on average, 98 % of cuts below 5 %, the worst 12 % (stopping)."""
     speed = np.array([cut.speed for cut in cuts])
     assert speed.mean() < 0.02, worst(cuts, "speed")
     assert (speed < 0.05).mean() >= 0.9, worst(cuts, "speed")
@@ -257,7 +257,7 @@ def test_speed_of_two_seconds_cut_anywhere(cuts):
 
 
 def test_contacts_of_two_seconds_cut_anywhere(cuts):
-    """Measured: 97.5 % on average, the worst 93 % (fast running)."""
+    """Measured: 97.8 % on average, the worst 94.6 % (running round a corner)."""
     contacts = np.array([cut.contacts for cut in cuts])
     assert contacts.mean() >= 0.965, worst(cuts, "contacts")
     assert (contacts >= 0.95).mean() >= 0.9, worst(cuts, "contacts")
@@ -322,7 +322,7 @@ def at_rate(name: str, rate: float) -> SampleTake:
     "name", ["walk_slower", "walk_about", "walk_start_stop", "run_faster", "walk_run", "run_start_stop_fast"]
 )
 def test_any_frame_rate_will_do(name, rate):
-    """Measured: 0.8 to 4.6 mm, 0.1 to 2.3 % of the speed, 95.0 % of contacts and more (a runner's at 120 Hz)."""
+    """Measured: 1.0 to 4.7 mm, 0.05 to 2.3 % of the speed, 95.6 % of contacts and more (a runner's at 120 Hz)."""
     take = at_rate(name, rate)
     found = analyse(take.motion)
     assert take.motion.frame_rate == rate

@@ -207,7 +207,7 @@ def test_a_rejected_wish_leaves_the_walker_as_it_was(formulas, wish):
         ({"points": np.zeros((3, 2)), "motion": ["walk", "fly", "run"]}, "'fly'; there are stand, walk, run"),
         ({"points": np.zeros((3, 2)), "motion": ["walk", 7, "run"]}, "7"),
         ({"points": np.zeros((3, 2)), "motion": ["walk", ["run"], "run"]}, "run"),
-        ({"points": np.zeros((3, 2)), "forces": np.zeros((3, 2))}, "either points or forces"),
+        ({"points": np.zeros((3, 2)), "forces": np.zeros((3, 2))}, "one of points, forces and accelerations"),
     ],
 )
 @pytest.mark.usefixtures("unchecked")

@@ -21,7 +21,7 @@ from stridecast.paths.strings import Taut, pull, widen
 
 Array = np.ndarray
 
-SOFTENING = (0.12, 0.06, 0.03, 0.015)
+SOFTENING = (0.12, 0.06, 0.03, 0.015, HAIR / 2, HAIR / 4, 0.0)
 """How far a searched curve may be moved to turn gradually, metres: tried in this order, always in the clear."""
 
 NARROWER = (1.0, 0.5, 0.0)
@@ -128,20 +128,31 @@ def _path(scene: Scene, space: Space, legs: list[Leg]) -> Path:
         if k + 1 < len(legs):
             bends.append(_goal_bend(scene, leg, legs[k + 1]))
     inserted = _inserted(space, bends, pull(start, bends, goal))
-    for chain in (widen(space, start, bends, goal), bends):
-        taut = pull(start, chain, goal)
-        if taut is None:
+    lines = [pull(start, widen(space, start, bends, goal), goal), pull(start, bends, goal)]
+    lines.append(_one_by_one(space, legs))
+    lines.append(Taut(polygon, polygon[1:-1]))
+    for line in lines:
+        if line is None:
             continue
-        controls = np.concatenate((start[None], taut.apexes, goal[None]))
+        controls = np.concatenate((start[None], line.apexes, goal[None]))
         for softening in SOFTENING:
-            curve = _with_controls(Curve.through(taut.points, rounding=softening), controls)
+            curve = _with_controls(Curve.through(line.points, rounding=softening), controls)
             if _is_good(space, curve):
                 return Path(curve=curve, polygon=polygon, inserted=inserted, rounds=0, searched=True)
-    for rounding in (HAIR / 2, HAIR / 4, 0.0):
-        curve = _with_controls(Curve.through(polygon, rounding=rounding), polygon)
-        if _is_good(space, curve):
-            return Path(curve=curve, polygon=polygon, inserted=inserted, rounds=0, searched=True)
     raise PathError("the way found is not clear")  # pragma: no cover
+
+
+def _one_by_one(space: Space, legs: list[Leg]) -> Taut:
+    """Strings from point to point, each for itself, with corners where they meet."""
+    points, apexes = [legs[0].points[:1]], []
+    for leg in legs:
+        ends = leg.points[0], leg.points[-1]
+        bends = list(leg.bends)
+        line = pull(ends[0], widen(space, ends[0], bends, ends[1]), ends[1]) or pull(ends[0], bends, ends[1])
+        line = line or Taut(leg.points, leg.points[1:-1])
+        points.append(line.points[1:])
+        apexes += [line.apexes, leg.points[-1:]]
+    return Taut(np.concatenate(points), np.concatenate(apexes[:-1]))
 
 
 def _goal_bend(scene: Scene, before: Leg, after: Leg) -> Bend:
@@ -168,7 +179,7 @@ def _is_good(space: Space, curve: Curve) -> bool:
     """Whether a curve is clear by the body's radius and passes all goals in order."""
     if not space.is_clear(shapely.LineString(curve.points)):
         return False
-    along, done = [], 0.0
+    done = 0.0
     for point in space.points[1:-1]:
         ahead = curve.distances >= done
         away = np.linalg.norm(curve.points[ahead] - point, axis=-1)
@@ -176,7 +187,6 @@ def _is_good(space: Space, curve: Curve) -> bool:
         if not len(near):
             return False
         done = float(curve.distances[ahead][near[0]])
-        along.append(done)
     return True
 
 

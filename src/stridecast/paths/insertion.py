@@ -26,7 +26,7 @@ DETOUR = 1.1
 """Ways longer than this, as a ratio to the line straight through the goals, are searched for instead."""
 
 WRONG_SIDE = 10.0
-"""Passing an obstacle on the preferred side is worth a detour of so many metres."""
+"""Passing an obstacle on the preferred side is worth a detour of so many metres, but not of more than half the way."""
 
 KEPT = 0.7
 """The share of the clearance that a curve keeps between control points."""
@@ -124,7 +124,7 @@ def _choose(scene: Scene, space: Space, obstacle: int, start: Array, stop: Array
             continue
         cost = float(np.linalg.norm(place - start) + np.linalg.norm(stop - place))
         if scene.behavior.preference.side not in ("none", name):
-            cost += WRONG_SIDE
+            cost += min(WRONG_SIDE, 0.5 * float(np.linalg.norm(stop - start)))
         if best is None or cost < best[0] - 1e-9:
             best = (cost, place, side)
     return None if best is None else best[1:]

@@ -131,7 +131,8 @@ def shortest(
     """The shortest way that keeps the clearances, or nothing.
 
     Only obstacles that block a line of sight are known to the graph; once a search meets no new ones its way is the
-    shortest among all. Passing an obstacle on the side that is not preferred costs ``WRONG_SIDE`` metres.
+    shortest among all. Passing an obstacle on the side that is not preferred costs ``WRONG_SIDE`` metres,
+    or half the distance from start to goal.
 
     Parameters
     ----------
@@ -179,7 +180,7 @@ def _search(
     tree = cKDTree(positions[usable]) if 0 < nearest < len(usable) else None
     to_goal = np.linalg.norm(positions - goal, axis=-1)
     weight = 1.0 if not nearest else HURRIED if side == "none" else HURRIED_BY_SIDE
-    worth = WRONG_SIDE / 30 if nearest else WRONG_SIDE
+    worth = WRONG_SIDE / 30 if nearest else min(WRONG_SIDE, 0.5 * math.dist(start, goal))
     enough = ENOUGH + len(corners.known) // 4
     by_start, by_goal = _close(corners, start), _close(corners, goal)
     met: set[int] = set()

@@ -219,9 +219,9 @@ def _headings(chain: list[Bend]) -> list[float] | None:
         way = other.center - one.center
         distance = math.hypot(*way)
         shift = other.side * other.radius - one.side * one.radius  # how much further left the other centre lies
-        if distance < 1e-9 or abs(shift) > distance:
+        if distance < 1e-9 or abs(shift) > distance + 1e-6:  # a start or goal may lie on a circle
             return None
-        out.append(math.atan2(way[0], way[1]) - math.asin(shift / distance))
+        out.append(math.atan2(way[0], way[1]) - math.asin(min(1.0, max(-1.0, shift / distance))))
     return out
 
 
