@@ -20,6 +20,7 @@ from typechecks import SOURCES, checked_modules
 ROOT = Path(__file__).resolve().parent.parent
 
 PUBLIC = [
+    "Behavior",
     "DatabaseError",
     "DatabaseFileError",
     "DownloadError",
@@ -29,7 +30,10 @@ PUBLIC = [
     "Motion",
     "MotionDatabase",
     "MotionError",
+    "PathError",
     "Pose",
+    "Scene",
+    "SceneError",
     "Skeleton",
     "SkeletonError",
     "SteeringGains",
@@ -43,10 +47,13 @@ PUBLIC = [
     "fetch",
     "load_database",
     "load_motion",
+    "load_scene",
     "load_skeleton",
     "mine",
     "sample_database",
     "save_database",
+    "save_scene",
+    "walk_scene",
     "write_bvh",
 ]
 """Every public name. A change here is a change for users: say so in CHANGELOG.md."""

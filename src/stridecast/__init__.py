@@ -23,6 +23,8 @@ if TYPE_CHECKING:
         FileError,
         InputError,
         MotionError,
+        PathError,
+        SceneError,
         SkeletonError,
         StridecastError,
         TakeError,
@@ -30,11 +32,14 @@ if TYPE_CHECKING:
     )
     from stridecast.formats.bvh import write_bvh
     from stridecast.formats.recordings import load_motion, load_skeleton
+    from stridecast.formats.scenes import load_scene, save_scene
     from stridecast.formats.store import load_database, save_database
     from stridecast.model.database import MotionDatabase
     from stridecast.model.motion import Motion
     from stridecast.model.pose import Pose, VehicleState
+    from stridecast.model.scene import Behavior, Scene
     from stridecast.model.skeleton import Skeleton
+    from stridecast.paths.follow import walk_scene
     from stridecast.samples.library import sample_database
     from stridecast.samples.recordings import fetch
     from stridecast.steering.force import SteeringGains
@@ -56,6 +61,13 @@ _HOME = {
     "Pose": "model.pose",
     "VehicleState": "model.pose",
     "Skeleton": "model.skeleton",
+    "Scene": "model.scene",
+    "Behavior": "model.scene",
+    "load_scene": "formats.scenes",
+    "save_scene": "formats.scenes",
+    "walk_scene": "paths.follow",
+    "SceneError": "errors",
+    "PathError": "errors",
     "SteeringGains": "steering.force",
     "Walker": "synthesis.walker",
     "Walkers": "synthesis.walker",
@@ -82,7 +94,12 @@ __all__ = [  # noqa: RUF022
     "save_database",
     "load_motion",
     "load_skeleton",
+    "load_scene",
+    "save_scene",
+    "walk_scene",
     "write_bvh",
+    "Scene",
+    "Behavior",
     "Motion",
     "MotionDatabase",
     "Pose",
@@ -97,6 +114,8 @@ __all__ = [  # noqa: RUF022
     "FileError",
     "InputError",
     "MotionError",
+    "PathError",
+    "SceneError",
     "SkeletonError",
     "StridecastError",
     "TakeError",
