@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ from stridecast.synthesis.journey import Journey, journey_of
 from stridecast.synthesis.walker import Walker
 
 Array = np.ndarray
+log = logging.getLogger("stridecast")
 
 STIFFNESS = 3.0
 """How fast a distance from the curve is made up, 1/s (a critically damped spring)."""
@@ -129,6 +131,8 @@ def walk_along(
         See ``plan_speeds``.
     """
     plan = plan_speeds(curve, database, behavior, stations)
+    if any(b.style for b in plan.behaviors):
+        log.warning("a walker cannot yet choose a style: it goes in the manner of its database")
     walker = Walker(
         database,
         curve.points[0],
