@@ -409,7 +409,7 @@ def test_a_place_that_is_taken_by_a_folder_is_named(tiny, folder, server):
 def test_a_request_that_makes_no_sense_is_refused(tiny, folder):
     with pytest.raises(InputError, match=r"no set of recordings 'kit'; there are cmu"):
         fetch("kit")
-    for mirror in ("ftp://host/x", "host/x", "http://", "http://[x", "file:///tmp/x", ""):
+    for mirror in ("ftp://host/x", "host/x", "http://", "http://[x", "file:///x", ""):
         with pytest.raises(InputError, match="a mirror is an address like https://host/folder, not"):
             bring(tiny, folder, mirror=mirror)
     with pytest.raises(InputError, match="at least 1 job, not 0"):
