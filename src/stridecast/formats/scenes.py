@@ -155,6 +155,10 @@ def load_scene(path: str | Path) -> Scene:
     return _scene(path, part, lines)
 
 
+_BREAKS = ("\x85", "\u2028", "\u2029")
+"""Line ends beyond those of ASCII: YAML folds them unless they are escaped."""
+
+
 def save_scene(path: str | Path, scene: Scene) -> None:
     """Write a scene that ``load_scene`` reads to the last bit; what is as usual is left out.
 
@@ -193,7 +197,8 @@ def save_scene(path: str | Path, scene: Scene) -> None:
         for s in scene.stations
     ]
     kept = {name: value for name, value in out.items() if value or name in ("version", "start", "goals")}
-    text = yaml.dump(kept, Dumper=_Dumper, default_flow_style=None, sort_keys=False, allow_unicode=True, width=118)
+    told = any(mark in thing["name"] for mark in _BREAKS for thing in (*out["roads"], *out["obstacles"]))
+    text = yaml.dump(kept, Dumper=_Dumper, default_flow_style=None, sort_keys=False, allow_unicode=not told, width=118)
     with replacing(path) as file:
         file.write(text.encode())
 
