@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from bodies import HIP_HEIGHT, humanoid, standing, writhing
@@ -56,10 +56,11 @@ def test_every_stance_is_found_once_at_any_frame_rate(speed, curvature, rate):
             assert all(sum(a < d and c < b for c, d in others) == 1 for a, b in inside)
 
 
-@given(st.floats(0.9, 1.45), st.floats(0.55, 1.3))
+@given(st.floats(0.9, 1.6), st.floats(0.55, 1.3))
 @settings(max_examples=10)
 def test_thresholds_follow_the_size_of_the_body(speed, size):
     """Short legs walk slower by the square root of their length (Froude)."""
+    assume(speed < 1.45 or size > 0.75)  # beyond that the formulas' legs do not reach the floor
     walk = gait(np.full(300, speed * size), rate=120.0 * np.sqrt(size), skeleton=humanoid(size))
     assert right_share(find_contacts(walk.motion).planted, walk.planted) >= 0.93
 
