@@ -55,7 +55,7 @@ class Trajectories:
             column = np.array(given, np.int64 if name == "ids" else np.float64)
             if column.shape != (rows, *shape):
                 raise InputError(f"{name} must have shape {(rows, *shape)}, not {column.shape}")
-            bad = np.flatnonzero(~np.isfinite(column.reshape(rows, -1)).all(axis=1)) if rows else []
+            bad = np.flatnonzero(~np.isfinite(column).reshape(rows, column.size // max(rows, 1)).all(axis=1))
             if len(bad):
                 raise InputError(f"{name} of row {int(bad[0])} is not a finite number")
             column.setflags(write=False)
