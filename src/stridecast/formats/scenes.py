@@ -179,7 +179,7 @@ def save_scene(path: str | Path, scene: Scene) -> None:
     }
     if preference:
         behavior["preference"] = preference
-    out: dict[str, Any] = {"version": 1, "start": scene.start.tolist(), "goals": scene.goals.tolist()}
+    out: dict[str, Any] = {"version": 1, "start": scene.task()[0].tolist(), "goals": scene.goals.tolist()}
     out["roads"] = [{"name": r.name, "points": r.points.tolist(), "width": float(r.width)} for r in scene.roads]
     out["obstacles"] = [
         {"name": o.name, "center": o.center.tolist(), "radius": float(o.radius)}

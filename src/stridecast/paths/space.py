@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from shapely import STRtree
 
 from stridecast.errors import SceneError
+from stridecast.model.people import Wall
 from stridecast.model.scene import Circle, Scene
 
 Array = np.ndarray
@@ -19,6 +20,9 @@ HAIR = 0.01
 
 CLEARANCES = {"near": 0.1, "far": 0.6}
 """What is kept beyond the body's radius where there is room, metres."""
+
+WALL = 0.02
+"""How thick walls are, metres."""
 
 _PIECE = 4.0
 """Long lines are looked up in pieces of this length, metres, lest their boxes hold everything."""
@@ -41,8 +45,12 @@ class Hit(NamedTuple):
 class Space:
     """The free room of a scene for a body of its radius.
 
+    Obstacles are those of the scene and, after them, the segments of its walls.
+
     Attributes
     ----------
+    names, labels
+        Of each obstacle: how it is called, and what it is too, for messages.
     clearance
         What is kept from each obstacle beyond the body's radius: less than the preference where the gap to the next
         obstacle, to the road's edge or to the start or a goal is narrow, metres.
@@ -52,26 +60,31 @@ class Space:
     Raises
     ------
     SceneError
-        A polygon that is none, a road too narrow for the body, a start or goal that is in an obstacle, off the roads or
-        too near to their edges for the body, or no goal but at the start.
+        No start and goals, a polygon that is none, a road too narrow for the body, a start or goal that is in an
+        obstacle, off the roads or too near to their edges for the body, or no goal but at the start.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.radius = scene.behavior.body_radius
-        self.names = [obstacle.name for obstacle in scene.obstacles]
-        self.cores = np.array([_core(obstacle) for obstacle in scene.obstacles], object)
-        self.reach = np.array([o.radius if isinstance(o, Circle) else 0.0 for o in scene.obstacles], np.float64)
+        start, goals = scene.task()
+        pieces = [(wall, piece) for wall in scene.walls for piece in _pieces(wall)]
+        self.names = [obstacle.name for obstacle in scene.obstacles] + [wall.name for wall, _ in pieces]
+        self.labels = [f"obstacle {o.name!r}" for o in scene.obstacles] + [f"wall {wall.name!r}" for wall, _ in pieces]
+        cores = [_core(obstacle) for obstacle in scene.obstacles] + [piece for _, piece in pieces]
+        self.cores = np.array(cores, object)
+        reach = [o.radius if isinstance(o, Circle) else 0.0 for o in scene.obstacles] + [0.0] * len(pieces)
+        self.reach = np.array(reach, np.float64)
         boxes = shapely.bounds(self.cores).reshape(-1, 4) + self.reach[:, None] * np.array([-1.0, -1.0, 1.0, 1.0])
         self.boxes = shapely.box(*boxes.T)
         self.tree = STRtree(self.boxes)
         self.road, self.edge = _roads(scene)
-        points = np.concatenate((scene.start[None], scene.goals))
+        points = np.concatenate((start[None], goals))
         away = np.linalg.norm(np.diff(points, axis=0), axis=-1) > 1e-6  # a goal where one is already is reached
         if not away.any():
             raise SceneError("the goal lies at the start; there is no way to go")
         self.points = points[np.concatenate(([True], away))]
-        names = ["the goal"] if len(scene.goals) == 1 else [f"goal {k + 1}" for k in range(len(scene.goals))]
+        names = ["the goal"] if len(goals) == 1 else [f"goal {k + 1}" for k in range(len(goals))]
         self.point_names = ["the start", *(name for name, far in zip(names, away, strict=True) if far)]
         self._check_points()
         self.wish = CLEARANCES[scene.behavior.preference.distance]
@@ -197,7 +210,7 @@ class Space:
                     )
                 what = f"the edge of road {road!r}"
             else:
-                what = f"obstacle {self.names[obstacle]!r}"
+                what = self.labels[obstacle]
                 if gap <= 0:
                     raise SceneError(f"{at} lies inside {what}; put it into the open")
             raise SceneError(f"{at} lies {gap:.3g} m from {what}; the body needs {self.radius:g} m")
@@ -253,6 +266,12 @@ def _core(obstacle: Any) -> Any:
             f"obstacle {obstacle.name!r} is no polygon: {why}; its corners must go round once, without crossing"
         )
     return shapely.geometry.polygon.orient(polygon)
+
+
+def _pieces(wall: Wall) -> list[Any]:
+    """Each segment of a wall as a thin rectangle."""
+    lines = shapely.linestrings(np.stack((wall.points[:-1], wall.points[1:]), axis=1))
+    return [shapely.geometry.polygon.orient(p) for p in shapely.buffer(lines, WALL / 2, cap_style="flat")]
 
 
 def _roads(scene: Scene) -> tuple[Any, Any]:
