@@ -183,8 +183,8 @@ class Scene:
         object.__setattr__(self, "goals", ground_points(goals, "goals", least))
         if self.seconds is not None and not (np.isfinite(self.seconds) and self.seconds > 0):
             raise SceneError(f"seconds must be a finite number above 0, not {self.seconds}")
-        if self.seed < 0:
-            raise SceneError(f"seed must be a whole number from 0, not {self.seed}")
+        if not 0 <= self.seed < 2**32:
+            raise SceneError(f"seed must be a whole number from 0 to {2**32 - 1}, not {self.seed}")
         seen: dict[str, str] = {}
         for kind, name in self._names():
             if name in seen:
