@@ -188,7 +188,7 @@ class Scene:
         seen: dict[str, str] = {}
         for kind, name in self._names():
             if name in seen:
-                raise SceneError(f"the name {name!r} of a {kind} is that of a {seen[name]} too; names must differ")
+                raise SceneError(f"two things are called {name!r}, {seen[name]} and {kind}; names must differ")
             seen[name] = kind
         for word, count in Counter(p.together for p in self.people if p.together is not None).items():
             if not 2 <= count <= LARGEST_GROUP:

@@ -142,8 +142,7 @@ def bottleneck(seed: int = 0, people: int = 60, width: float = 1.2) -> Scene:
         Wall(name="back wall", points=np.array([(half, -deep), (-half, -deep)])),
     )
     area = np.array([(-half, -deep), (half, -deep), (half, -1.0), (-half, -1.0)])
-    door = np.array([(0.0, 0.5)])
-    sources = (_source("room", area, (door, _gate(2 * half, 2 * BEYOND)), people),)
+    sources = (_source("room", area, (_gate(2 * half, 2 * BEYOND),), people),)
     return Scene(walls=walls, sources=sources, seed=seed, seconds=120.0)
 
 
