@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -243,6 +244,14 @@ def test_the_scenes_of_the_examples_hold_crowds(name, least, most):
     for person in [p for p in people if p.stops][:: max(1, len(people) // 12)]:
         curve = generate_path(task_of(scene, person)).curve
         np.testing.assert_allclose(curve.points[-1], person.stops[-1][0], atol=1e-9)
+
+
+def test_the_examples_of_the_page_are_scenes(tmp_path):
+    page = (SCENES.parent.parent / "docs" / "command.md").read_text(encoding="utf-8")
+    walk, crowd = (load_scene(yaml(tmp_path, text)) for text in re.findall(r"```yaml\n(.*?)```", page, re.DOTALL))
+    assert walk.has_walker
+    people = [p for due in population(crowd).until(crowd.seconds) for p in due.people]
+    assert {"Ann", "Ben", "window shoppers 4", "south end 20"} <= {p.name for p in people}
 
 
 @pytest.mark.parametrize(
