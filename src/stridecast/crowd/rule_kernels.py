@@ -116,7 +116,7 @@ def answer(
     side = people.side[c]
     if side == 0.0:  # the nearer one, else the right
         side = -1.0 if off > -OFFSET * (radius + o[RADIUS]) else 1.0
-    if not moves and o[HX] * dx + o[HZ] * dz > QUEUES and people.count[j] >= 2:
+    if not moves and o[HX] * dx + o[HZ] * dz > QUEUES and people.points[j] >= 2:
         return FOLLOW, j, soonest, 0.0, math.inf
     if not moves:
         rule = PASS_ROUND

@@ -25,7 +25,7 @@ class People(NamedTuple):
     scripted: Array  # N, moves by a script and waits where people are in its way
     stays: Array  # N, stands at the end of the way instead of leaving
     first: Array  # N, first point of the way among all ways
-    count: Array  # N, points of the way; below 2: stands where it is
+    points: Array  # N, points of the way; below 2: stands where it is
 
 
 def make_people(count: int) -> People:
@@ -33,7 +33,7 @@ def make_people(count: int) -> People:
     numbers = ("radius", "wish", "side", "keep", "rank", "slot")
     flags = ("runs", "waits", "scripted", "stays")
     arrays = {name: np.zeros(count) for name in numbers} | {name: np.zeros(count, np.bool_) for name in flags}
-    whole = {name: np.zeros(count, np.int64) for name in ("number", "first", "count")}
+    whole = {name: np.zeros(count, np.int64) for name in ("number", "first", "points")}
     return People(**arrays, **whole, company=np.full(count, -1))
 
 

@@ -212,7 +212,7 @@ def decide(
         rule, other, contact, side, most = answer(
             people, moving, ground, things, standing, seen, count, c, dx, dz, wish, elapsed
         )
-        if rule == ON_THE_WAY and people.count[c] >= 2:
+        if rule == ON_THE_WAY and people.points[c] >= 2:
             px, pz, _, _ = place_at(people, ways, c, moving.place[c])
             if math.hypot(moving.position[c, 0] - px, moving.position[c, 1] - pz) > 0.3 + abs(people.slot[c]):
                 rule = RETURN
@@ -227,7 +227,7 @@ def decide(
         if m >= 0 and moving.stuck[c] > STUCK:
             o = seen[m]
             opposed = o[HX] * dx + o[HZ] * dz < 0.0
-            moving.opposed[c] = opposed and people.count[int(o[ROW])] >= 2
+            moving.opposed[c] = opposed and people.points[int(o[ROW])] >= 2
             moving.jammed_next[c] = o[JAMMED] > 0.0 or moving.opposed[c]
             if not (moving.jammed_next[c] or opposed):
                 patience *= QUEUING

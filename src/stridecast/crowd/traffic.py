@@ -100,7 +100,7 @@ class Traffic:
                 getattr(self.people, name)[row] = getattr(new, name)
             for name in ("company", "slot", "stays", "scripted"):
                 getattr(self.people, name)[row] = getattr(new, name)
-            self.people.first[row], self.people.count[row] = begin, len(new.way)
+            self.people.first[row], self.people.points[row] = begin, len(new.way)
             points.append(new.way)
             along.append(
                 np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(new.way, axis=0), axis=-1))))[: len(new.way)]
@@ -168,6 +168,6 @@ class Traffic:
     def arrived(self) -> Int[Array, "arrived"]:
         """Rows of those who are at the end of their way and leave there."""
         rows = self.present
-        rows = rows[(self.people.count[rows] >= 2) & ~self.people.stays[rows] & ~self.people.scripted[rows]]
-        last = self.people.first[rows] + self.people.count[rows] - 1
+        rows = rows[(self.people.points[rows] >= 2) & ~self.people.stays[rows] & ~self.people.scripted[rows]]
+        last = self.people.first[rows] + self.people.points[rows] - 1
         return rows[self.ways.along[last] - self.moving.place[rows] < ARRIVED]

@@ -30,7 +30,7 @@ AROUND = 16
 @kernel
 def find_place(people: People, moving: Moving, ways: Ways, c: int) -> None:
     """Take up the place on the way that is nearest now."""
-    first, count = people.first[c], people.count[c]
+    first, count = people.first[c], people.points[c]
     if count < 2:
         return
     x, z = moving.position[c, 0], moving.position[c, 1]
@@ -65,7 +65,7 @@ def index_of(ways: Ways, first: int, count: int, place: float) -> int:
 @kernel
 def place_at(people: People, ways: Ways, c: int, place: float) -> tuple[float, float, float, float]:
     """Point and direction of a way at a place; beyond its end it goes straight on."""
-    first, count = people.first[c], people.count[c]
+    first, count = people.first[c], people.points[c]
     k = index_of(ways, first, count, place)
     length = ways.along[k + 1] - ways.along[k]
     dx = (ways.points[k + 1, 0] - ways.points[k, 0]) / length
@@ -77,7 +77,7 @@ def place_at(people: People, ways: Ways, c: int, place: float) -> tuple[float, f
 @kernel
 def length_of(people: People, ways: Ways, c: int) -> float:
     """Length of somebody's way, metres."""
-    return ways.along[people.first[c] + people.count[c] - 1]
+    return ways.along[people.first[c] + people.points[c] - 1]
 
 
 @kernel
@@ -87,7 +87,7 @@ def wanted(
     """Direction and speed that somebody would take if they were alone; speed 0 for who stands."""
     if moving.retreat[c] > 0.0:
         return moving.retreat_way[c, 0], moving.retreat_way[c, 1], min(RETREAT_SPEED, people.wish[c])
-    if people.count[c] < 2:
+    if people.points[c] < 2:
         return math.sin(moving.heading[c]), math.cos(moving.heading[c]), 0.0
     x, z = moving.position[c, 0], moving.position[c, 1]
     left = length_of(people, ways, c) - moving.place[c]
