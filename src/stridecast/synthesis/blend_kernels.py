@@ -71,6 +71,10 @@ def blended(tables: Tables, state: State, c: int, generic: float, out: np.ndarra
                 out[k] += w0 * f[i - 1, k] + w1 * f[i, k] + w2 * f[i + 1, k] + w3 * f[i + 2, k]
     if state.size[c, 0] != 0.0:
         enlarge(tables.larger, state.chosen[c], state.weights[c], state.size[c, 0], i, b, out)
+    scale = state.scale[c]
+    if scale != 1.0:
+        for k in range(len(out)):
+            out[k] = tables.neutral[k] + scale * (out[k] - tables.neutral[k])
 
 
 @kernel
@@ -105,7 +109,7 @@ def open_seam(tables: Tables, state: State, c: int, meant: np.ndarray, dt: float
     state.features[c, yaw] -= turns
     state.before[c, yaw] -= turns
     for k in range(len(meant)):
-        rate = (state.features[c, k] - state.before[c, k]) / dt
+        rate = (state.features[c, k] - state.before[c, k]) / state.elapsed[c]
         state.seam[c, k] = state.features[c, k] + rate * dt - meant[k]
         state.seam_rate[c, k] = rate - (ahead[k] - meant[k]) / dt
 

@@ -27,6 +27,9 @@ ENTRY_TOLERANCE = 0.2
 SPEED_TOLERANCE = 0.04
 """Walking and running can begin this much above their speeds, m/s: who slows down nears them ever more slowly."""
 
+HARDEST = 3.0
+"""Accelerations of vehicles that move by themselves count up to this, m/s2."""
+
 TIE = 1e-7
 """Left and right, mirrored, cost the same: the first is taken then, whichever way rounding goes."""
 
@@ -34,12 +37,7 @@ TIE = 1e-7
 @kernel
 def begin_segment(tables: Tables, state: State, c: int, request: int, leftover: float) -> None:
     """Choose group and examples for the next segment of character ``c``; ``leftover`` seconds of it have passed."""
-    group = next_group(tables, state, c, request)
-    state.group[c] = group
-    blend_nearest(tables, state, c, group)
-    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
-    state.started[c] = speed
-    state.segments[c] += 1
+    begin_group(tables, state, c, next_group(tables, state, c, request), 0.0)
     slope = 0.0
     for n in range(NEIGHBOURS):
         if state.weights[c, n] > 0.0:
@@ -50,10 +48,44 @@ def begin_segment(tables: Tables, state: State, c: int, request: int, leftover: 
 
 
 @kernel
+def begin_group(tables: Tables, state: State, c: int, group: int, generic: float) -> None:
+    """Begin a segment of a group at a generic time, with the examples nearest to what the character does."""
+    state.group[c] = group
+    describe_vehicle(tables, state, c)
+    blend_nearest(tables, state, c, group)
+    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    state.started[c] = speed
+    state.segments[c] += 1
+    state.generic[c] = generic
+
+
+@kernel
+def describe_vehicle(tables: Tables, state: State, c: int) -> None:
+    """Take down what groups and examples are chosen by: speed, tangential and lateral acceleration.
+
+    A vehicle that moves by itself and goes slower than anybody was seen to walk has the examples of the slowest that
+    turn as it does, one that goes faster than everybody those of the fastest.
+    """
+    vx, vz = state.velocity[c, 0], state.velocity[c, 1]
+    ax, az = state.acceleration[c, 0], state.acceleration[c, 1]
+    sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
+    speed = math.hypot(vx, vz)
+    state.choice[c, 0] = speed
+    state.choice[c, 1] = ax * sine + az * cosine
+    state.choice[c, 2] = ax * cosine - az * sine
+    if state.given[c]:
+        speed = min(max(speed, tables.slowest), tables.fastest)
+        state.choice[c, 0] = speed
+        state.choice[c, 1] = min(max(state.choice[c, 1], -HARDEST), HARDEST)
+        state.choice[c, 2] = min(max(speed * state.turning[c], -HARDEST), HARDEST)
+
+
+@kernel
 def next_group(tables: Tables, state: State, c: int, request: int) -> int:
     """The group on the shortest way to the motion asked for that the present speed allows."""
     g = state.group[c]
-    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    describe_vehicle(tables, state, c)
+    speed = state.choice[c, 0]
     if state.fresh[c]:
         return first_group(tables, state, c, request)
     best, best_cost = -1, 1e18
@@ -117,13 +149,10 @@ def first_group(tables: Tables, state: State, c: int, request: int) -> int:
 @kernel
 def distance(tables: Tables, state: State, c: int, e: int) -> float:
     """Squared distance of an example's beginning from what the character does: vehicle and pose."""
-    vx, vz = state.velocity[c, 0], state.velocity[c, 1]
-    ax, az = state.acceleration[c, 0], state.acceleration[c, 1]
-    sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
-    more = ax * sine + az * cosine - tables.parameters[e, 1]
-    a = (math.hypot(vx, vz) - tables.parameters[e, 0] + AHEAD * more) / SPEED_SCALE
+    more = state.choice[c, 1] - tables.parameters[e, 1]
+    a = (state.choice[c, 0] - tables.parameters[e, 0] + AHEAD * more) / SPEED_SCALE
     b = more / TANGENTIAL_SCALE
-    d = (ax * cosine - az * sine - tables.parameters[e, 2]) / LATERAL_SCALE
+    d = (state.choice[c, 2] - tables.parameters[e, 2]) / LATERAL_SCALE
     total = a * a + b * b + d * d
     pose = 0.0
     for k in range(tables.features.shape[2]):
