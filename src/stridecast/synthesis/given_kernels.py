@@ -32,10 +32,10 @@ NOT_TURNING = 0.08
 TURNS = 0.3
 """Who stands steps at once if the vehicle turns faster than this, rad/s; below only once the feet are left behind."""
 
-FEET_TOLERANCE, TWIST_TOLERANCE = 0.04, 0.22
+FEET_TOLERANCE, TWIST_TOLERANCE = 0.045, 0.22
 """Feet this far from where they belong under a standing body are astray by 1: metres and radians."""
 
-HOME, ASTRAY = 0.9, 1.5
+HOME, ASTRAY = 1.0, 1.6
 """A body that comes to rest stands once its feet are less astray than the first; one that stands steps beyond the second."""
 
 APPEARS_WALKING = 0.25
@@ -56,7 +56,7 @@ SWING = 0.8
 SCALE_HALF_LIFE = 0.06
 """Half of a change of how large movements are is done after this, seconds."""
 
-STANCE = 1.2
+STANCE = 1.35
 """How long a foot stands, in half cycles of walking."""
 
 FARTHEST_LEAD = 0.2
@@ -67,6 +67,9 @@ MOST_LEAD_TURN = 0.7
 
 INNER, OUTER = 0.7, 0.2
 """Share of a stance's turn by which the foot is turned ahead when it comes down, on the inside of the turn and outside."""
+
+LANDS = 0.5
+"""A foot that swings when a half cycle begins lands after about this part of it."""
 
 CLEARANCE = 0.045
 """The smaller the step, the more of this is added to the height of the swinging foot, metres."""
@@ -213,7 +216,7 @@ def against_examples(tables: Tables, state: State, c: int) -> tuple[float, float
             duration += w * tables.durations[e]
     sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
     ahead = max(state.velocity[c, 0] * sine + state.velocity[c, 1] * cosine, 0.0)
-    return ahead / max(speed, 0.3), state.turning[c] - turning, duration
+    return ahead / max(speed, 0.3), state.turning[c] - min(state.scale[c], 1.0) * turning, duration
 
 
 @kernel
@@ -276,22 +279,38 @@ def aim_feet(tables: Tables, state: State, c: int, rests_in: float) -> None:
     share = 1.0
     if tables.leads_to[g] == RUN or tables.comes_from[g] == RUN:
         share = 0.5
-    # The way the vehicle goes until the foot stands below it, less the one that the pose has.
-    shows = state.scale[c] * ahead / max(ratio, 1e-6) * half if ratio > 1e-6 else 0.0
-    until = min(half / max(pace, 0.2), 0.5 * rests_in)
-    x = share * (state.velocity[c, 0] * until - shows * sine)
-    z = share * (state.velocity[c, 1] * until - shows * cosine)
-    far = math.hypot(x, z)
-    if far > FARTHEST_LEAD:
-        x, z = x * FARTHEST_LEAD / far, z * FARTHEST_LEAD / far
+    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    brakes = state.acceleration[c, 0] * sine + state.acceleration[c, 1] * cosine
     turn = share * turning * STANCE * duration / max(pace, 0.5)
     for side in range(2):
+        # The way the vehicle goes from where the foot lands until it stands below it, less the one that the pose has.
+        lands = until_landing(tables, state.generic[c], g, side) * duration / max(pace, SWING)
+        later = min(max(1.0 + brakes * lands / max(speed, 0.05), 0.0), 1.5)
+        shows = state.scale[c] * math.sqrt(later) * ahead / ratio * half if ratio > 1e-6 else 0.0
+        until = later * min(half / max(pace, 0.2), 0.5 * max(rests_in - lands, 0.0))
+        x = share * (state.velocity[c, 0] * until - shows * sine)
+        z = share * (state.velocity[c, 1] * until - shows * cosine)
+        far = math.hypot(x, z)
+        if far > FARTHEST_LEAD:
+            x, z = x * FARTHEST_LEAD / far, z * FARTHEST_LEAD / far
         inside = (turning > 0.0) == (side == 0)
         state.lead[c, side, 0], state.lead[c, side, 1] = x, z
         state.lead[c, side, 2] = min(max((INNER if inside else OUTER) * turn, -MOST_LEAD_TURN), MOST_LEAD_TURN)
         small = max(1.0 - state.scale[c], 0.0)
         if small > 0.0:
             state.lift[c, side] = CLEARANCE * small * swing_height(tables, state.generic[c], g, side)
+
+
+@kernel
+def until_landing(tables: Tables, generic: float, g: int, side: int) -> float:
+    """Generic time until a foot in the air lands; 0 for one that stands."""
+    if tables.planted[g, 0, side]:
+        last = 0
+        while tables.keys[g, last] < 1.0:
+            last += 1
+        in_air = not tables.planted[g, last, side] and last > 0 and generic > tables.keys[g, last - 1]
+        return 1.0 - min(generic, 1.0) + LANDS if in_air else 0.0
+    return max(tables.keys[g, 0] - generic, 0.0)
 
 
 @kernel
