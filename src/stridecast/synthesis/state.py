@@ -76,6 +76,11 @@ class State(NamedTuple):
     bounds: Array  # C 7: jerk, least and greatest tangential, greatest lateral, least and greatest speed; in force
     acted: Array  # C, bits of the bounds that acted
     fresh: Array  # C, nothing shown yet
+    # room to work in, as kernels make no arrays
+    meant: Array  # C D, blended features
+    ahead: Array  # C D, those of the next frame
+    found: Array  # C NEIGHBOURS+1, distances of the nearest examples
+    found_examples: Array  # C NEIGHBOURS+1
 
 
 def make_state(count: int, tables: Tables) -> State:
@@ -122,8 +127,12 @@ def make_state(count: int, tables: Tables) -> State:
         "root": (3,),
         "rotations": (joints, 4),
         "bounds": (6,),
+        "meant": (width,),
+        "ahead": (width,),
+        "found": (NEIGHBOURS + 1,),
     }
     whole = {"group": (), "chosen": (NEIGHBOURS,), "segments": (), "made_up": (), "acted": ()}
+    whole["found_examples"] = (NEIGHBOURS + 1,)
     flags = {"arriving": (), "locked": (2,), "given_up": (2,), "fresh": (), "given": ()}
     arrays = {name: np.zeros((count, *shape)) for name, shape in shapes.items()}
     arrays |= {name: np.zeros((count, *shape), np.int64) for name, shape in whole.items()}

@@ -84,11 +84,10 @@ def step_block(
     last: int,
 ) -> None:
     """Advance those of characters ``first`` to ``last`` who are active by one frame, of ``steps`` seconds each."""
-    meant = np.empty(tables.features.shape[2])
     for c in range(first, last):
         if not active[c]:
             continue
-        dt = steps[c]
+        dt, meant = steps[c], state.meant[c]
         state.given[c] = kind[c] == GIVEN
         if state.given[c]:
             take_over(state, given, c, dt)

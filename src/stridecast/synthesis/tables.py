@@ -32,6 +32,7 @@ class Tables(NamedTuple):
 
     # examples
     features: Array  # E R D
+    beginnings: Array  # E D, features of the first frames, side by side for the choice
     larger: Array  # E R D, what exaggerated movements add, single precision; none while nobody asks for another size
     times: Array  # E R
     parameters: Array  # E 3, speed at the first frame, mean tangential and lateral acceleration
@@ -107,6 +108,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
     step_off, step_off_at = _step_off(groups, usable)
     return Tables(
         features=examples.features,
+        beginnings=np.ascontiguousarray(examples.features[:, MARGIN]),
         larger=np.zeros((0, *examples.features.shape[1:]), np.float32),
         times=examples.times,
         parameters=_parameters(database),

@@ -320,6 +320,8 @@ class Walkers:
         """Numbers of a wish as an array of a shape, finite for those who are stepped."""
         try:
             numbers = np.ascontiguousarray(wish, np.float64)
+            if not numbers.flags.writeable:  # to compiled code a type of its own
+                numbers = numbers.copy()
         except (TypeError, ValueError):
             raise WishError(f"{name} must be numbers of shape {shape}") from None
         if numbers.shape != shape:
