@@ -60,6 +60,9 @@ NEARLY_STRAIGHT = 0.972
 GIVE_UP = 0.05
 """A planted foot that would pull the pelvis down by more than this is let go early, metres."""
 
+APART, ABREAST = 0.07, 0.5
+"""Led feet keep their toes so far apart sideways, the less the further one is ahead, up to the second; metres."""
+
 TIP = 0.004
 """The tips of the toes stay above this height, metres."""
 
@@ -216,6 +219,10 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
         )
         state.twist[c, side] = twist + turn
         lead_x, lead_z = led(state, c, side, toe)
+        if state.given[c]:
+            push = apart(state, c, side, toe[0] + lead_x, toe[2] + lead_z)
+            lead_x += push * math.cos(state.heading[c])
+            lead_z -= push * math.sin(state.heading[c])
     for k in range(3):
         aim = lead_x if k == 0 else (lead_z if k == 2 else 0.0)
         slip, rate = decay(state.slip[c, side, k] - aim, state.slip_rate[c, side, k], half_life, dt)
@@ -238,6 +245,17 @@ def led(state, c, side, toe):  # type: ignore[no-untyped-def]
         state.lead[c, side, 0] + x * (cosine - 1.0) + z * sine,
         state.lead[c, side, 1] + z * (cosine - 1.0) - x * sine,
     )
+
+
+@kernel
+def apart(state, c, side, x, z):  # type: ignore[no-untyped-def]
+    """By how much a free foot that passes the other one is moved to the left so that the legs do not touch."""
+    sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
+    dx, dz = x - state.toe[c, 1 - side, 0], z - state.toe[c, 1 - side, 2]
+    ahead, left = dx * sine + dz * cosine, dx * cosine - dz * sine
+    outwards = 1.0 if side == 0 else -1.0
+    near = 1.0 - (ahead / ABREAST) ** 2
+    return outwards * min(max(near * (APART - outwards * left), 0.0), APART) if near > 0.0 else 0.0
 
 
 @kernel

@@ -111,7 +111,7 @@ def next_segment_of_given(tables: Tables, state: State, c: int, motion: int, res
     idle = tables.comes_from[g] == STAND and tables.leads_to[g] == STAND
     request = motion_of_given(tables, state, c, motion, idle)
     if idle and request != STAND:
-        step_off(tables, state, c)
+        step_off(tables, state, c, request)
         return True
     if request == STAND and not idle and tables.standing >= 0:
         state.scale[c], state.scale_rate[c] = 1.0, 0.0
@@ -171,6 +171,9 @@ def motion_of_given(tables: Tables, state: State, c: int, motion: int, idle: boo
     """Standing while the vehicle rests and the feet are where they belong; else walking or running."""
     speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
     turning = abs(state.turning[c])
+    h = tables.halves
+    if max(h[WALK, 0], h[WALK, 1], h[RUN, 0], h[RUN, 1]) < 0:
+        return STAND
     if idle:
         goes = state.astray[c] > ASTRAY or turning > TURNS or (speed > AT_REST and motion != STAND)
         return gait(tables, motion, speed, False) if goes else STAND
@@ -182,7 +185,7 @@ def motion_of_given(tables: Tables, state: State, c: int, motion: int, idle: boo
 
 
 @kernel
-def step_off(tables: Tables, state: State, c: int) -> None:
+def step_off(tables: Tables, state: State, c: int, request: int) -> None:
     """Begin to step: with the foot on the inside of a turn, else with the one that is left behind."""
     side = 1
     if abs(state.turning[c]) > NOT_TURNING:
@@ -196,7 +199,7 @@ def step_off(tables: Tables, state: State, c: int) -> None:
     group, generic = tables.step_off[side], tables.step_off_at[side]
     if group < 0:
         describe_vehicle(tables, state, c)
-        group, generic = first_group(tables, state, c, WALK), 0.0
+        group, generic = first_group(tables, state, c, request), 0.0
     state.scale[c], state.scale_rate[c] = 0.0, 0.0
     begin_group(tables, state, c, group, generic)
 
