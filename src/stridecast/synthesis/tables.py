@@ -140,12 +140,18 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         step_off=step_off,
         step_off_at=step_off_at,
         swings=np.array([_swings(g) for g in groups]),
-        slowest=float(min((e[0] for e, g, u in zip(entry, groups, usable, strict=True) if u and _goes(g)), default=0.0)),
+        slowest=float(
+            min((e[0] for e, g, u in zip(entry, groups, usable, strict=True) if u and _goes(g)), default=0.0)
+        ),
         fastest=float(
             max((e[1] for e, g, u in zip(entry, groups, usable, strict=True) if u and _goes(g)), default=np.inf)
         ),
-        run_from=min((e[0] for e, g, u in zip(entry, groups, usable, strict=True) if u and g.motion == RUN), default=2.0),
-        walk_to=max((e[1] for e, g, u in zip(entry, groups, usable, strict=True) if u and g.motion == WALK), default=2.0),
+        run_from=min(
+            (e[0] for e, g, u in zip(entry, groups, usable, strict=True) if u and g.motion == RUN), default=2.0
+        ),
+        walk_to=max(
+            (e[1] for e, g, u in zip(entry, groups, usable, strict=True) if u and g.motion == WALK), default=2.0
+        ),
         home=_home(database, neutral),
         neutral=neutral,
         references=database.references,
