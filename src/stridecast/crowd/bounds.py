@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 from jaxtyping import Float
@@ -65,7 +64,7 @@ class HumanBounds:
             )
 
     @classmethod
-    def of(cls, database: MotionDatabase) -> Self:
+    def of(cls, database: MotionDatabase) -> HumanBounds:
         """Hull over a database's groups: standing, walking, starting and stopping to walk; and running.
 
         Raises
