@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -23,13 +24,19 @@ SLOWEST_SAMPLING = 2.0
 """Samples further apart than this tell no steering, seconds."""
 
 LONGEST_GAP = 1.0
-"""Who is gone for longer than this, and for longer than three samples, comes back as a stretch of their own, seconds."""
+"""Who is gone for longer than this, seconds, and for longer than three samples comes back with another track."""
 
 FINEST_SWAY = 8.0
 """Sway shows in tracks with at least so many samples a second."""
 
+STRIDES, AWAY = 0.4, 0.3
+"""Who has at first not this speed (m/s) faces where they will be when they have gone so far (m)."""
+
 NEAR = 0.1
 """Within this distance the source counts as followed, metres."""
+
+COARSE = 0.02
+"""What a source does beyond the bounds by less than this is not counted, metres (30 samples a second)."""
 
 ROUNDS = 14
 """So often a reference is made stiffer where it asks for too much."""
@@ -200,7 +207,7 @@ def _stretches(trajectories: Trajectories) -> list[tuple[int, slice]]:
             raise InputError(f"{what} (are times in seconds?)")
         breaks = np.flatnonzero(steps > max(LONGEST_GAP, 3.0 * usual)) + 1
         edges = rows.start + np.concatenate(([0], breaks, [rows.stop - rows.start]))
-        out += [(person, slice(int(a), int(b))) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        out += [(person, slice(a, b)) for a, b in pairwise(edges.tolist())]
     return out
 
 
@@ -212,8 +219,7 @@ def _reference(
     frames = int(np.ceil(times[-1] * rate - 1e-6)) + 1
     told = noise_of(times, points) if noise is None else max(noise, 1e-4)
     facing = None if trajectories.headings is None else float(trajectories.headings[rows.start])
-    smoother = Smoother(times, points, told)
-    gentle = smoother.curve()
+    gentle = Smoother(times, points, told).curve()
     seconds = float(times[-1])
     if seconds > 0 and (len(times) - 1) / seconds >= FINEST_SWAY:
         gentle = without_sway(gentle)
@@ -282,11 +288,14 @@ def _resampled(curve: Float[Array, "grid 2"], moments: Float[Array, "frames"]) -
 
 def _first_heading(points: Float[Array, "frames 2"], rate: float, facing: float | None) -> float:
     """Where somebody faces at first: where they go, soon or later, else where they were seen to face."""
-    velocity = np.diff(points, axis=0) * rate
-    going = np.flatnonzero(np.hypot(*velocity.T) > 0.2) if len(velocity) else np.zeros(0, np.int64)
-    if len(going) and (facing is None or going[0] == 0):
-        return float(np.arctan2(*velocity[going[0]]))
-    return 0.0 if facing is None else facing
+    begins = (points[1] - points[0]) * rate if len(points) > 1 else np.zeros(2)
+    if np.hypot(*begins) < STRIDES:
+        if facing is not None:
+            return facing
+        way = points - points[0]
+        far = np.flatnonzero(np.hypot(*way.T) > AWAY)
+        begins = way[far[0]] if len(far) else np.zeros(2)
+    return float(np.arctan2(*begins))
 
 
 def _track(
@@ -312,7 +321,7 @@ def _track(
             mean_distance=float(distances.mean()),
             largest_distance=float(distances.max()),
             samples=len(times),
-            beyond=_beyond(reference.gentle, moments, times, bounds),
+            beyond=_beyond(reference, moments, times, bounds),
             frames_away=int(np.sum(away > NEAR)),
             noise=reference.noise,
         ),
@@ -320,18 +329,14 @@ def _track(
 
 
 def _beyond(
-    gentle: Float[Array, "frames 2"],
-    moments: Float[Array, "frames"],
-    times: Float[Array, "samples"],
-    bounds: HumanBounds,
+    reference: _Reference, moments: Float[Array, "frames"], times: Float[Array, "samples"], bounds: HumanBounds
 ) -> dict[str, int]:
-    """Samples at which a source is beyond each of its bounds."""
-    if len(gentle) < 5:
-        return dict.fromkeys(BOUNDS, 0)
+    """Samples at which a source is beyond each of its bounds; who shifts about on the spot is inside."""
     grid = np.arange(0.0, moments[-1] + 1e-9, 1.0 / GRID)
     if len(grid) < 5:
         return dict.fromkeys(BOUNDS, 0)
-    curve = np.stack([np.interp(grid, moments, gentle[:, k]) for k in range(2)], axis=-1)
+    curve = make_interp_spline(moments, reference.gentle, k=3)(grid)
+    curve = Smoother(grid, curve, COARSE).curve()[: len(grid)]
     speed, tangential, lateral, jerk = _asked(curve)
     most, low, high, wide = bounds.at(speed)
     found = (
@@ -341,4 +346,6 @@ def _beyond(
         jerk > most,
     )
     at = np.clip(np.round(times * GRID).astype(np.int64), 0, len(grid) - 1)
-    return {name: int(np.sum(one[at])) for name, one in zip(BOUNDS, found, strict=True)}
+    frames = np.minimum(np.searchsorted(moments, times), len(moments) - 1)
+    walking = ~reference.standing[frames]
+    return {name: int(np.sum(one[at] & walking)) for name, one in zip(BOUNDS, found, strict=True)}

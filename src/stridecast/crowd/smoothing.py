@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.linalg import solveh_banded
-from scipy.ndimage import gaussian_filter1d, label, maximum_filter1d, minimum_filter1d
+from scipy.ndimage import gaussian_filter1d, label, maximum_filter1d, uniform_filter1d
 
 from stridecast.geometry import ground
 
@@ -20,10 +20,10 @@ JERK, ACCELERATION, MEMORY = 4.0, 3.0, 0.2
 QUIETEST, LOUDEST, UNTOLD = 3e-4, 0.1, 0.02
 """Least and greatest noise that is believed, and that of tracks too short to tell, metres."""
 
-SWAYING = (0.5, 1.3)
+SWAYING = (0.6, 1.3)
 """Frequencies of strides, Hz: the body sways once and surges twice in each."""
 
-WINDOW, EXPLAINED, WIDEST = 4.0, 0.7, 0.08
+WINDOW, EXPLAINED, WIDEST = 4.0, 0.8, 0.08
 """Sway is looked for so long (s), must explain so much of what is left across, and is no wider than this (m)."""
 
 STEERED = 0.35
@@ -47,7 +47,8 @@ def noise_of(times: Float[Array, "samples"], points: Float[Array, "samples 2"]) 
     change = np.diff(points, 3, axis=0)[whole]
     if len(change) < 4:
         return UNTOLD
-    spread = 1.4826 * float(np.median(np.abs(change))) / np.sqrt(20.0)
+    # the median length of two normal numbers, and what third differences make of noise
+    spread = float(np.median(np.hypot(*change.T))) / 1.1774 / np.sqrt(20.0)
     return float(np.clip(spread, QUIETEST, LOUDEST))
 
 
@@ -185,28 +186,20 @@ def standing_places(curve: Float[Array, "grid 2"]) -> tuple[Bool[Array, "grid"],
 
     A stand is left when it is left by more than ``SPOT``: who shifts about on the spot does not walk.
     """
-    wide = int(PAUSE * GRID) // 2 * 2 + 1
-    if len(curve) < wide:
-        reach = np.ptp(curve, axis=0)
-        still = np.full(len(curve), bool(np.hypot(*reach) < SPOT * len(curve) / wide))
-    else:
-        spread = np.hypot(
-            *(
-                maximum_filter1d(curve, wide, axis=0, mode="nearest")
-                - minimum_filter1d(curve, wide, axis=0, mode="nearest")
-            ).T
-        )
-        centre = spread < 1.5 * SPOT
-        # the whole window of a centre belongs to the stand
-        still = maximum_filter1d(centre.astype(np.int8), wide - 2, mode="constant").astype(bool)
-        speed = np.hypot(*np.gradient(curve, 1.0 / GRID, axis=0).T)
-        still &= speed < STRIDING
+    wide = min(int(PAUSE * GRID), len(curve)) // 2 * 2 - 1
+    middle = curve.mean(axis=0)
+    mean = uniform_filter1d(curve - middle, wide, axis=0, mode="nearest")
+    square = uniform_filter1d(np.sum((curve - middle) ** 2, axis=-1), wide, mode="nearest")
+    spread = np.sqrt(np.maximum(square - np.sum(mean**2, axis=-1), 0.0))
+    # the whole window around a quiet moment belongs to the stand
+    still = maximum_filter1d((spread < 0.5 * SPOT).astype(np.int8), wide, mode="constant").astype(bool)
+    still &= np.hypot(*np.gradient(curve, 1.0 / GRID, axis=0).T) < STRIDING
     out = curve.copy()
     runs, count = label(still)
     for number in range(1, count + 1):
         rows = np.flatnonzero(runs == number)
         for first, last in _spots(curve[rows]):
-            out[rows[first:last]] = np.median(curve[rows[first:last]], axis=0)
+            out[rows[first:last]] = np.mean(curve[rows[first:last]], axis=0)
     return still, out
 
 
