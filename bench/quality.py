@@ -17,9 +17,7 @@ import numpy as np
 import stridecast as sc
 from stridecast.analysis.take import analyse
 from stridecast.body import kinematics
-from stridecast.geometry import quaternions as quat
-from stridecast.geometry import signals
-from stridecast.model.contacts import SIDES
+from stridecast.scorecard.motion import knee_bends, seam_accelerations, toe_travel
 from stridecast.synthesis.journey import Journey, PointStream, follow
 
 SUBJECTS = (None, "16")
@@ -55,56 +53,19 @@ def course() -> PointStream:
     return PointStream(times=np.arange(len(points)) / RATE, points=np.array(points), motions=tuple(motions))
 
 
-def toe_travel(motion: sc.Motion, planted: np.ndarray) -> list[float]:
-    """Millimetres that each planted toe travels on the ground in the middle 60 % of its contact."""
-    positions = kinematics.pose(motion).positions
-    out = []
-    for side, name in enumerate(SIDES):
-        toe = positions[:, motion.skeleton.joint(f"{name}_toe")][:, [0, 2]]
-        for value, start, stop in signals.runs(planted[:, side]):
-            length = stop - start
-            if value and 0.12 < length / motion.frame_rate < 2.0 and start > 0 and stop < motion.frames:
-                middle = toe[start + round(0.2 * length) : stop - round(0.2 * length)]
-                out.append(1000 * float(np.linalg.norm(np.diff(middle, axis=0), axis=-1).sum()))
-    return out
-
-
-def seams(journey: Journey) -> tuple[float, float]:
-    """99th percentile of the joints' angular acceleration within 0.1 s of seams and elsewhere, rad/s2."""
-    motion = journey.motion
-    turning = quat.angular_velocity(motion.rotations, motion.frame_rate)
-    acceleration = np.linalg.norm(np.gradient(turning, 1 / motion.frame_rate, axis=0), axis=-1)
-    acceleration = acceleration[:, list(motion.skeleton.roles.values())]
-    changes = [i for i in range(1, motion.frames) if journey.groups[i] != journey.groups[i - 1]]
-    near = np.zeros(motion.frames, bool)
-    reach = round(0.1 * motion.frame_rate)
-    for i in changes:
-        near[max(0, i - reach) : i + reach + 1] = True
-    return float(np.percentile(acceleration[near], 99)), float(np.percentile(acceleration[~near], 99))
-
-
-def knee_bends(motion: sc.Motion) -> np.ndarray:
-    """Signed bend of both knees at every frame, degrees: the leg's plane seen along the knee's mean axis."""
-    positions = kinematics.pose(motion).positions
-    turned = kinematics.pose(motion).rotations
-    out = []
-    for side in SIDES:
-        thigh, shin, foot = motion.skeleton.chain(f"{side}_thigh", f"{side}_shin", f"{side}_foot")
-        down, on = positions[:, shin] - positions[:, thigh], positions[:, foot] - positions[:, shin]
-        axis = quat.log(motion.rotations[:, shin]).mean(axis=0)
-        hinge = quat.rotate(turned[:, shin], axis / np.linalg.norm(axis))
-        cross = np.cross(down, on)
-        sine = np.linalg.norm(cross, axis=-1) * np.sign(np.sum(cross * hinge, axis=-1))
-        out.append(np.degrees(np.arctan2(sine, np.sum(down * on, axis=-1))))
-    return np.array(out)
+def millimetres(motion: sc.Motion, planted: np.ndarray) -> list[float]:
+    """Travel of each planted toe in the middle of its contact."""
+    return [way for way, _ in toe_travel(motion, planted)]
 
 
 def report(journey: Journey) -> None:
     """Print the figures of one walk."""
     motion = journey.motion
-    held = toe_travel(motion, journey.planted)
-    seen = toe_travel(motion, analyse(motion).contacts.planted)
-    near, elsewhere = seams(journey)
+    held = millimetres(motion, journey.planted)
+    seen = millimetres(motion, analyse(motion).contacts.planted)
+    near, elsewhere = seam_accelerations(
+        motion, [i for i in range(1, motion.frames) if journey.groups[i] != journey.groups[i - 1]]
+    )
     world = kinematics.pose(motion)
     lowest = min(world.positions[..., 1].min(), kinematics.ends(motion.skeleton, world)[..., 1].min())
     print(
@@ -140,7 +101,7 @@ def main() -> None:
             except sc.InputError:
                 continue
             kind = "run" if any(s.motion == "run" for s in take.gait.segments) else "walk"
-            people[kind] += toe_travel(take.motion, take.contacts.planted)
+            people[kind] += millimetres(take.motion, take.contacts.planted)
         for kind, found in people.items():
             print(
                 f"recordings, {kind}: median {np.median(found):.1f} mm, "

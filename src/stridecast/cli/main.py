@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from stridecast.cli import build, fetch, mine, samples, show, walk
+from stridecast.cli import build, fetch, mine, samples, score, show, walk
 from stridecast.errors import InputError
 
 
@@ -36,6 +36,7 @@ app.command("mine")(mine.mine)
 app.command("walk")(walk.walk)
 app.command("samples")(samples.samples)
 app.command("fetch")(fetch.fetch)
+app.command("score")(score.score)
 
 
 def _version(wanted: bool) -> bool:

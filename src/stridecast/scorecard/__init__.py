@@ -1,0 +1,1 @@
+"""Measures: how well crowds walk and how well bodies move."""
