@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 from jaxtyping import Float
 
 from stridecast.crowd.state import Cells, Ground
+from stridecast.model.scene import Circle, Scene
+from stridecast.paths.solids import Solids
 
 Array = np.ndarray
 
@@ -14,6 +17,17 @@ CELL = 2.0
 
 MOST_CELLS = 4_000_000
 """Larger scenes have wider cells."""
+
+
+def ground_of(scene: Scene, solids: Solids) -> Ground:
+    """What stands in a scene: walls, outlines of polygons, edges of the roads, circles."""
+    circles = [(*o.center, o.radius) for o in scene.obstacles if isinstance(o, Circle)]
+    lines = [wall.points for wall in scene.walls]
+    lines += [np.concatenate((o.points, o.points[:1])) for o in scene.obstacles if not isinstance(o, Circle)]
+    if solids.edge is not None:
+        lines += [shapely.get_coordinates(part) for part in shapely.get_parts(solids.edge)]
+    pieces = [np.concatenate((line[:-1], line[1:]), axis=-1) for line in lines]
+    return make_ground(np.concatenate(pieces) if pieces else np.zeros((0, 4)), np.array(circles).reshape(-1, 3))
 
 
 def make_ground(segments: Float[Array, "segments 4"], circles: Float[Array, "circles 3"]) -> Ground:

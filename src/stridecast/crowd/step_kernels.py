@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from stridecast.crowd.choice_kernels import CHOICES, SHARES, weigh
-from stridecast.crowd.ground_kernels import standing_near
+from stridecast.crowd.ground_kernels import room, standing_near
 from stridecast.crowd.neighbour_kernels import FIELDS, HX, HZ, JAMMED, PX, PZ, RADIUS, ROW, cell_of, look
 from stridecast.crowd.rule_kernels import answer
 from stridecast.crowd.rules import GIVE_WAY, HELD, ON_THE_WAY, RETURN, STAND, WAIT
@@ -366,6 +366,35 @@ def conflict(
                 if not clear:
                     return int(j)
     return -1
+
+
+@kernel
+def fits(
+    people: People,
+    moving: Moving,
+    ground: Ground,
+    limits: Limits,
+    state: np.ndarray,
+    radius: float,
+    runs: bool,
+    dt: float,
+) -> bool:
+    """Whether somebody who appears in a state has room to stop, and leaves it to everybody else."""
+    path = np.empty((moving.path.shape[1], 2))
+    n = stop(limits, runs, state[0], state[1], state[2], state[3], state[4], state[5], state[6], dt, path)
+    things = np.empty(STANDING, np.int64)
+    standing = standing_near(ground, state[0], state[1], REACH, things)
+    for m in range(standing):
+        if room(ground, things[m], state[0], state[1]) < radius:
+            return False
+    if not clear_of_ground(ground, things, standing, path, n, radius):
+        return False
+    for j in range(len(moving.here)):
+        if moving.here[j] and not apart(
+            path, n, moving.path[j], moving.stops[j], 0, radius + people.radius[j] + HAIR
+        ):
+            return False
+    return True
 
 
 @kernel

@@ -12,8 +12,9 @@ from jaxtyping import Float, Int
 from stridecast.crowd.ground import make_cells
 from stridecast.crowd.neighbour_kernels import sort_into_cells
 from stridecast.crowd.state import Ground, Limits, Moving, People, Ways, make_moving, make_people
-from stridecast.crowd.step_kernels import propose, settle, write
+from stridecast.crowd.step_kernels import fits, propose, settle, write
 from stridecast.crowd.vehicle_kernels import stop
+from stridecast.model.people import Mover
 
 Array = np.ndarray
 
@@ -49,7 +50,7 @@ class Newcomer:
     company: int = -1
     slot: float = 0.0
     stays: bool = False
-    scripted: bool = False
+    mover: Mover | None = None
 
 
 class Traffic:
@@ -75,6 +76,7 @@ class Traffic:
         self.moving: Moving = make_moving(ROOM, self._frames)
         self.ways = Ways(points=np.zeros((0, 2)), along=np.zeros(0))
         self.frame = 0
+        self._scripts: dict[int, tuple[Mover, float]] = {}
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     @property
@@ -98,8 +100,9 @@ class Traffic:
         for row, new in zip(rows.tolist(), news, strict=True):
             for name in ("number", "radius", "wish", "runs", "side", "keep", "waits", "rank"):
                 getattr(self.people, name)[row] = getattr(new, name)
-            for name in ("company", "slot", "stays", "scripted"):
+            for name in ("company", "slot", "stays"):
                 getattr(self.people, name)[row] = getattr(new, name)
+            self.people.scripted[row] = new.mover is not None
             self.people.first[row], self.people.points[row] = begin, len(new.way)
             points.append(new.way)
             along.append(
@@ -118,10 +121,9 @@ class Traffic:
         m.position[row], m.heading[row], m.velocity[row] = new.position, new.heading, new.speed * ahead
         m.target[row] = m.velocity[row]
         state = (*m.position[row], *m.velocity[row], 0.0, 0.0, new.heading)
-        if not new.scripted:
-            m.stops[row] = stop(self.limits, bool(new.runs), *map(float, state), 1.0 / self.frame_rate, m.path[row])
-        else:
-            m.path[row, 0] = new.position
+        m.stops[row] = stop(self.limits, bool(new.runs), *map(float, state), 1.0 / self.frame_rate, m.path[row])
+        if new.mover is not None:
+            self._scripts[row] = (new.mover, float(new.mover.times[0]) if self.frame else 0.0)
 
     def remove(self, rows: Int[Array, "leaving"]) -> None:
         """Let people leave."""
@@ -147,6 +149,7 @@ class Traffic:
             farthest = float(np.linalg.norm(last - m.position[rows], axis=-1).max())
             widest = float(p.radius[rows].max())
             granted = np.zeros(len(m.here), np.bool_)
+            self._propose_scripts(dt)
             end = int(rows[-1]) + 1
             self._each(
                 end,
@@ -156,7 +159,36 @@ class Traffic:
             )
             self._each(end, lambda a, b: settle(p, m, cells, farthest, widest, granted, a, b))
             self._each(end, lambda a, b: write(p, m, self.ways, self.limits, granted, dt, a, b))
+            for row, (mover, clock) in self._scripts.items():
+                if granted[row]:  # else the script waits until people are gone
+                    self._scripts[row] = (mover, clock + dt)
         self.frame += 1
+
+    def _propose_scripts(self, dt: float) -> None:
+        """What moves by a script goes on by one frame, if nobody is in its way; it can stop at once."""
+        m = self.moving
+        for row, (mover, clock) in self._scripts.items():
+            place = mover.at(np.array(clock + dt))
+            m.meant[row, 0], m.meant_stops[row] = place, 1
+            velocity = (place - m.position[row]) / dt
+            m.next[row] = (*place, *velocity, 0.0, 0.0, m.heading[row])
+
+    def has_room(self, new: Newcomer) -> bool:
+        """Whether somebody can appear so that everybody keeps the room to stop."""
+        ahead = (float(np.sin(new.heading)), float(np.cos(new.heading)))
+        state = (*new.position, new.speed * ahead[0], new.speed * ahead[1], 0.0, 0.0, new.heading)
+        return bool(
+            fits(
+                self.people,
+                self.moving,
+                self.ground,
+                self.limits,
+                np.array(state, np.float64),
+                new.radius,
+                new.runs,
+                1.0 / self.frame_rate,
+            )
+        )
 
     def _each(self, end: int, kernel) -> None:  # type: ignore[no-untyped-def]
         blocks = [(a, min(a + BLOCK, end)) for a in range(0, end, BLOCK)]

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from stridecast.crowd.human_kernels import KEPT, mixed
 from stridecast.crowd.state import Limits
 from stridecast.geometry.kernels import kernel, wrap
 from stridecast.steering.kernels import limit, pull
@@ -30,9 +31,15 @@ SHARP = math.radians(50.0)
 
 
 @kernel
-def gait(limits: Limits, runs: bool, speed: float) -> int:
-    """Row of the bounds that hold at a speed."""
-    return 1 if runs and speed > limits.change else 0
+def at_speed(limits: Limits, speed: float) -> tuple[float, float, float, float]:
+    """Jerk, least and greatest tangential acceleration, and lateral one per speed that hold at a speed."""
+    share = min(max((speed - limits.fades[0]) / (limits.fades[1] - limits.fades[0]), 0.0), 1.0)
+    return (
+        KEPT * mixed(limits.jerk, share),
+        KEPT * mixed(limits.low, share),
+        KEPT * mixed(limits.high, share),
+        KEPT * mixed(limits.wide, share),
+    )
 
 
 @kernel
@@ -66,9 +73,8 @@ def advance(
         sine, cosine = vx / speed, vz / speed
     else:
         sine, cosine = ux / wish, uz / wish
-    g = gait(limits, runs, speed)
-    jerk, low, high, wide = limits.jerk[g], limits.low[g], limits.high[g], limits.wide[g]
-    fastest = limits.fastest[1 if runs else 0]
+    jerk, low, high, wide = at_speed(limits, speed)
+    fastest = KEPT * limits.fastest[1 if runs else 0]
     askew = abs(wrap(math.atan2(sine, cosine) - heading))
     if askew > ASKEW:
         fastest = max(ASIDE if askew < ABOUT else BACK, speed)
