@@ -53,14 +53,12 @@ class Bodies:
         phases: Float[Array, "rows"],
         heights: Float[Array, "rows"],
         sizes: list[str],
-        styles: Float[Array, "rows"],
     ) -> None:
         """Put new people into rows, ``heights`` in metres."""
         while len(rows) and rows.max() >= len(self.roots):
             self._grow()
         self.scales[rows] = heights / self.height
         self._waited[rows] = 0
-        self._styles[rows] = styles
         for pool, inside in self._split(rows):
             own = rows[inside] - pool * POOL
             scaled = positions[inside] / self.scales[rows[inside], None]
@@ -83,7 +81,6 @@ class Bodies:
         self._waited[rows] += 1
         due = np.ones(len(rows), np.bool_) if levels is None else self._waited[rows] >= levels
         late = rows[~due]
-        self.roots[late][:, [0, 2]] = 0.0
         for pool, inside in self._split(rows):
             own = rows[inside] - pool * POOL
             count = len(self._pools[pool])

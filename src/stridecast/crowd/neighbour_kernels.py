@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from stridecast.crowd.state import Cells, Moving, People
+from stridecast.crowd.state import Cells, Moving, People, Scratch
 from stridecast.geometry.kernels import kernel
 
 SETTLING = 0.25
@@ -27,15 +27,15 @@ def sort_into_cells(here: np.ndarray, position: np.ndarray, cells: Cells) -> Non
     first[:] = 0
     for c in range(len(here)):
         if here[c]:
-            first[cell_of(cells, position[c, 0], position[c, 1]) + 1] += 1
+            first[cell_of(cells, position[c, 0], position[c, 1])] += 1
     for k in range(1, len(first)):
         first[k] += first[k - 1]
-    at = first[:-1].copy()
-    for c in range(len(here)):
+    for n in range(len(here)):  # from the last on, so that each cell's first entry comes back to where it begins
+        c = len(here) - 1 - n
         if here[c]:
             k = cell_of(cells, position[c, 0], position[c, 1])
-            rows[at[k]] = c
-            at[k] += 1
+            first[k] -= 1
+            rows[first[k]] = c
 
 
 @kernel
@@ -47,15 +47,15 @@ def cell_of(cells: Cells, x: float, z: float) -> int:
 
 
 @kernel
-def look(people: People, moving: Moving, cells: Cells, c: int, reach: float, seen: np.ndarray) -> int:
-    """What somebody sees of the nearest others within ``reach``, nearest first, as many as ``seen`` has rows.
+def look(people: People, moving: Moving, cells: Cells, c: int, reach: float, scratch: Scratch) -> int:
+    """What somebody sees of the nearest others within ``reach``, nearest first, as many as there is room for.
 
     Whose distances are equal are sorted by their numbers, so that the order of rows decides nothing.
     """
     x, z = moving.position[c, 0], moving.position[c, 1]
     vx, vz = moving.velocity[c, 0], moving.velocity[c, 1]
-    most = len(seen)
-    near, gaps = np.empty(most, np.int64), np.empty(most)
+    near, gaps, seen = scratch.near, scratch.gaps, scratch.seen
+    most = len(near)
     low, high = cell_of(cells, x - reach, z - reach), cell_of(cells, x + reach, z + reach)
     nz = cells.shape[1]
     n = 0

@@ -30,6 +30,17 @@ class People(NamedTuple):
     points: Array  # N, points of the way; below 2: stands where it is
 
 
+class Scratch(NamedTuple):
+    """Room for what one thread works out about one person at a time; kernels make no arrays."""
+
+    near: Array  # rows of those who are seen
+    gaps: Array
+    seen: Array  # what is seen of them (see ``neighbour_kernels``)
+    things: Array  # what stands near
+    targets: Array  # velocities that may be aimed at
+    costs: Array
+
+
 def make_people(count: int) -> People:
     """``count`` empty rows."""
     numbers = ("radius", "wish", "side", "keep", "rank", "slot")
@@ -124,89 +135,6 @@ def make_limits(bounds: HumanBounds) -> Limits:
         fastest=bounds.fastest[both],
         fades=np.array(bounds.fades),
     )
-
-
-def make_people(count: int) -> People:
-    """``count`` empty rows."""
-    numbers = ("radius", "wish", "side", "keep", "rank", "slot")
-    flags = ("runs", "waits", "scripted", "stays")
-    arrays = {name: np.zeros(count) for name in numbers} | {name: np.zeros(count, np.bool_) for name in flags}
-    whole = {name: np.zeros(count, np.int64) for name in ("number", "first", "points")}
-    return People(**arrays, **whole, company=np.full(count, -1))
-
-
-class Moving(NamedTuple):
-    """How they move and what they are up to. K frames that stopping may take at most."""
-
-    here: Array  # N, row in use
-    position: Array  # N 2
-    velocity: Array  # N 2
-    acceleration: Array  # N 2
-    heading: Array  # N
-    turning: Array  # N, side of a reversal under way
-    place: Array  # N, how far along the way, metres
-    # decision
-    target: Array  # N 2, velocity that is aimed at
-    rule: Array  # N, code of the rule that is followed
-    other: Array  # N, row of whom it is about, -1 nobody
-    contact: Array  # N, time until they would meet, seconds
-    chosen_side: Array  # N, 1 left, -1 right, 0 none
-    since: Array  # N, how long this encounter lasts, seconds
-    stuck: Array  # N, how long somebody who wants to go has not got on, seconds
-    jammed: Array  # N, stands where people who want to go in other directions block each other
-    jammed_next: Array  # N, the same after this frame
-    opposed: Array  # N, faces somebody there who wants to go the other way
-    retreat: Array  # N, so long they still give way, seconds
-    retreat_way: Array  # N 2, direction in which
-    held: Array  # N, whether the room to stop decided in this frame
-    # commitment: where somebody is from frame to frame who brakes from now on
-    path: Array  # N K 2
-    stops: Array  # N, frames until rest; from then on the last place
-    meant: Array  # N K 2, the same for the step that is proposed
-    meant_stops: Array  # N
-    next: Array  # N 7, position, velocity, acceleration and heading proposed
-    next_turning: Array  # N
-    free: Array  # N, whether the proposal leaves everybody else's commitment alone
-
-
-class Ground(NamedTuple):
-    """What stands: segments (walls, edges) and circles, found through a grid of cells."""
-
-    segments: Array  # S 4: x, z, x, z
-    circles: Array  # C 3: x, z, radius
-    corner: Array  # 2, of the grid
-    cell: float
-    shape: Array  # 2, cells in x and z
-    first: Array  # cells + 1, first entry of each cell
-    entries: Array  # indices: a segment, or S + circle
-
-
-class Cells(NamedTuple):
-    """People sorted into the cells of a grid."""
-
-    corner: Array  # 2
-    size: float  # of a cell, metres
-    shape: Array  # 2, cells in x and z
-    first: Array  # cells + 1, first entry of each cell in rows
-    rows: Array  # N
-
-
-class Ways(NamedTuple):
-    """All ways one after the other."""
-
-    points: Array  # P 2
-    along: Array  # P, distance from the way's own beginning
-
-
-class Limits(NamedTuple):
-    """Human bounds by gait: row 0 walking, row 1 running."""
-
-    jerk: Array  # 2
-    low: Array  # 2
-    high: Array  # 2
-    wide: Array  # 2, lateral acceleration per speed, which is turning speed
-    fastest: Array  # 2
-    change: float  # above this speed a runner runs, m/s
 
 
 def make_moving(count: int, frames: int) -> Moving:

@@ -12,7 +12,7 @@ from stridecast.crowd.neighbour_kernels import FIELDS, HX, HZ, JAMMED, PX, PZ, R
 from stridecast.crowd.rule_kernels import answer
 from stridecast.crowd.rules import GIVE_WAY, HELD, ON_THE_WAY, RETURN, STAND, WAIT
 from stridecast.crowd.safety_kernels import HAIR, apart, clear_of_ground
-from stridecast.crowd.state import Cells, Ground, Limits, Moving, People, Ways
+from stridecast.crowd.state import Cells, Ground, Limits, Moving, People, Scratch, Ways
 from stridecast.crowd.vehicle_kernels import REST, advance, stop
 from stridecast.crowd.way_kernels import company_pace, find_place, place_at, wanted, way_out
 from stridecast.geometry.kernels import kernel
@@ -65,6 +65,18 @@ QUEUING = 5.0
 """In a queue people are so many times as patient."""
 
 
+def make_scratch() -> Scratch:
+    """Room for one thread."""
+    return Scratch(
+        near=np.zeros(SEEN, np.int64),
+        gaps=np.zeros(SEEN),
+        seen=np.zeros((SEEN, FIELDS)),
+        things=np.zeros(STANDING, np.int64),
+        targets=np.zeros((CHOICES, 2)),
+        costs=np.zeros(CHOICES),
+    )
+
+
 @kernel
 def mixed(a: int, b: int, seed: int) -> float:
     """A number from 0 to 1 that only looks random (splitmix64)."""
@@ -83,6 +95,7 @@ def propose(
     ground: Ground,
     limits: Limits,
     cells: Cells,
+    scratch: Scratch,
     farthest: float,
     widest: float,
     frame: int,
@@ -92,9 +105,7 @@ def propose(
     end: int,
 ) -> None:
     """The read phase: what each of the rows ``begin`` to ``end`` would do, without touching what others read."""
-    seen = np.empty((SEEN, FIELDS))
-    things = np.empty(STANDING, np.int64)
-    targets, costs = np.empty((CHOICES, 2)), np.empty(CHOICES)
+    seen, things, targets, costs = scratch.seen, scratch.things, scratch.targets, scratch.costs
     every = max(round(DECIDES / dt), 1)
     for c in range(begin, end):
         if not moving.here[c]:
@@ -122,7 +133,7 @@ def propose(
             dt,
         ):
             continue
-        count = look(people, moving, cells, c, SIGHT, seen)
+        count = look(people, moving, cells, c, SIGHT, scratch)
         dx, dz, wish = wanted(people, moving, ways, ground, things, standing, c)
         if people.company[c] >= 0 and wish > 0.0:
             wish *= company_pace(seen, count, dx, dz)
@@ -147,7 +158,7 @@ def propose(
         )
         moving.free[c] = False
         for _ in range(TRIES):
-            best = int(np.argmin(costs))
+            best = cheapest(costs)
             if not costs[best] < np.inf:
                 break
             if try_target(
@@ -174,6 +185,16 @@ def propose(
         if not moving.free[c]:
             moving.target[c] = 0.0
             moving.held[c] = True
+
+
+@kernel
+def cheapest(costs: np.ndarray) -> int:
+    """The first of the lowest."""
+    best = 0
+    for k in range(1, len(costs)):
+        if costs[k] < costs[best]:
+            best = k
+    return best
 
 
 @kernel
@@ -377,12 +398,12 @@ def fits(
     state: np.ndarray,
     radius: float,
     runs: bool,
+    things: np.ndarray,
+    path: np.ndarray,
     dt: float,
 ) -> bool:
     """Whether somebody who appears in a state has room to stop, and leaves it to everybody else."""
-    path = np.empty((moving.path.shape[1], 2))
     n = stop(limits, runs, state[0], state[1], state[2], state[3], state[4], state[5], state[6], dt, path)
-    things = np.empty(STANDING, np.int64)
     standing = standing_near(ground, state[0], state[1], REACH, things)
     for m in range(standing):
         if room(ground, things[m], state[0], state[1]) < radius:
@@ -390,9 +411,7 @@ def fits(
     if not clear_of_ground(ground, things, standing, path, n, radius):
         return False
     for j in range(len(moving.here)):
-        if moving.here[j] and not apart(
-            path, n, moving.path[j], moving.stops[j], 0, radius + people.radius[j] + HAIR
-        ):
+        if moving.here[j] and not apart(path, n, moving.path[j], moving.stops[j], 0, radius + people.radius[j] + HAIR):
             return False
     return True
 
@@ -435,7 +454,8 @@ def write(
             continue
         if granted[c]:
             n = moving.meant_stops[c]
-            moving.path[c, :n] = moving.meant[c, :n]
+            for k in range(n):
+                moving.path[c, k, 0], moving.path[c, k, 1] = moving.meant[c, k, 0], moving.meant[c, k, 1]
             moving.stops[c] = n
             out = moving.next[c]
             moving.turning[c] = moving.next_turning[c]
@@ -449,7 +469,8 @@ def write(
         else:
             n = moving.stops[c]
             if n > 1:
-                moving.path[c, : n - 1] = moving.path[c, 1:n]
+                for k in range(n - 1):
+                    moving.path[c, k, 0], moving.path[c, k, 1] = moving.path[c, k + 1, 0], moving.path[c, k + 1, 1]
                 moving.stops[c] = n - 1
             x, z, vx, vz, ax, az, heading, _ = advance(
                 limits,

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from stridecast.crowd.ground import make_cells
 from stridecast.crowd.neighbour_kernels import sort_into_cells
 from stridecast.crowd.state import Ground, Limits, Moving, People, Ways, make_moving, make_people
-from stridecast.crowd.step_kernels import fits, propose, settle, write
+from stridecast.crowd.step_kernels import STANDING, fits, make_scratch, propose, settle, write
 from stridecast.crowd.vehicle_kernels import stop
 from stridecast.model.people import Mover
 
@@ -154,7 +154,20 @@ class Traffic:
             self._each(
                 end,
                 lambda a, b: propose(
-                    p, m, self.ways, self.ground, self.limits, cells, farthest, widest, self.frame, self.seed, dt, a, b
+                    p,
+                    m,
+                    self.ways,
+                    self.ground,
+                    self.limits,
+                    cells,
+                    make_scratch(),
+                    farthest,
+                    widest,
+                    self.frame,
+                    self.seed,
+                    dt,
+                    a,
+                    b,
                 ),
             )
             self._each(end, lambda a, b: settle(p, m, cells, farthest, widest, granted, a, b))
@@ -186,6 +199,8 @@ class Traffic:
                 np.array(state, np.float64),
                 new.radius,
                 new.runs,
+                np.zeros(STANDING, np.int64),
+                np.zeros((self._frames, 2)),
                 1.0 / self.frame_rate,
             )
         )
