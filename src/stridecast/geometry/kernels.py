@@ -18,7 +18,8 @@ def kernel(function: Any) -> Any:
     Kernels make no arrays. So references need not be counted, which took two thirds of a step while tuples of a hundred
     arrays were handed from function to function.
     """
-    dispatcher: Any = njit(cache=True, nogil=True, error_model="numpy", fastmath=False, _nrt=False)(function)
+    options: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": False, "_nrt": False}
+    dispatcher: Any = njit(**options)(function)
     # Numba looks at the kernel's own file only; a cached kernel would keep calling the old code of another file.
     dispatcher._cache._cache_file._source_stamp = _SOURCES
     return dispatcher
