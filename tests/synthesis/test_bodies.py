@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -62,7 +63,7 @@ def test_a_given_vehicle_is_shown_bit_for_bit(database):
 def test_bounds_say_what_the_vehicle_did(formulas):
     given = [tracks(30.0)["surges"]]
     poses = bodies_of(formulas, given, 30.0)
-    for before, pose in zip(poses, poses[1:], strict=False):
+    for before, pose in pairwise(poses):
         v, b = pose.vehicle, pose.bounds
         size = np.linalg.norm(v.acceleration[0]) - 1e-12
         assert b.tangential[0, 0] <= -size <= size <= b.tangential[0, 1]
@@ -107,7 +108,7 @@ def test_feet_that_step_leave_the_floor(database, name, rate):
     sole = make_tables(database).sole
     for foot in range(2):
         changes = np.flatnonzero(np.diff(body.planted[:, foot].astype(int)))
-        for start, stop in zip(changes, changes[1:], strict=False):
+        for start, stop in pairwise(changes):
             if not body.planted[start + 1, foot] and stop - start > 0.2 * rate:
                 assert body.toes[start : stop + 1, foot, 1].max() > sole + 0.012
 

@@ -36,7 +36,7 @@ FEET_TOLERANCE, TWIST_TOLERANCE = 0.045, 0.22
 """Feet this far from where they belong under a standing body are astray by 1: metres and radians."""
 
 HOME, ASTRAY = 1.0, 1.6
-"""A body that comes to rest stands once its feet are less astray than the first; one that stands steps beyond the second."""
+"""A body that comes to rest stands once its feet are less astray than this; one that stands steps beyond that."""
 
 APPEARS_WALKING = 0.25
 """Who is placed anew and goes faster than this is seen walking in the first frame, m/s."""
@@ -66,7 +66,7 @@ MOST_LEAD_TURN = 0.7
 """... and turned no further, radians."""
 
 INNER, OUTER = 0.7, 0.2
-"""Share of a stance's turn by which the foot is turned ahead when it comes down, on the inside of the turn and outside."""
+"""Share of a stance's turn by which a foot is turned ahead when it comes down, inside the turn and outside."""
 
 LANDS = 0.5
 """A foot that swings when a half cycle begins lands after about this part of it."""
@@ -102,7 +102,7 @@ def take_over(state: State, given, c: int, dt: float) -> None:  # type: ignore[n
 
 
 @kernel
-def next_segment_of_given(tables: Tables, state: State, c: int, motion: int, rests_in: float, dt: float) -> bool:
+def next_segment_of_given(tables: Tables, state: State, c: int, motion: int, dt: float) -> bool:
     """Let the segment run on at the pace of the vehicle; stand and step off as soon as feet and vehicle ask for it."""
     if state.fresh[c]:
         appear(tables, state, c, motion)
@@ -206,7 +206,7 @@ def step_off(tables: Tables, state: State, c: int, request: int) -> None:
 
 @kernel
 def against_examples(tables: Tables, state: State, c: int) -> tuple[float, float, float]:
-    """Speed against the examples' where they are, by how much more the vehicle turns (rad/s), seconds of a half cycle."""
+    """Speed against the examples', by how much more the vehicle turns (rad/s), seconds of a half cycle."""
     rows = tables.times.shape[1]
     i, u = row_of(min(state.generic[c], 1.0), rows)
     speed, turning, duration = 0.0, 0.0, 0.0

@@ -91,7 +91,7 @@ def step_block(
         state.given[c] = kind[c] == GIVEN
         if state.given[c]:
             take_over(state, given, c, dt)
-            begun = next_segment_of_given(tables, state, c, motions[c], rests_in[c], dt)
+            begun = next_segment_of_given(tables, state, c, motions[c], dt)
             aim_feet(tables, state, c, rests_in[c])
         else:
             state.scale[c], state.lead[c], state.lift[c] = 1.0, 0.0, 0.0

@@ -282,13 +282,13 @@ class Walkers:
         ]
         if len(given) != 1:
             raise WishError("give one of points, forces and accelerations, or vehicles")
-        kind, name, wish = given[0]
+        kind, name, given_wish = given[0]
         stepped = self._who(active)
-        moved = self._given
+        moved, wish = self._given, self._points
         if vehicles is not None:
             moved = self._vehicles(vehicles, stepped)
         else:
-            wish = self._numbers(name, wish, self._points.shape, stepped)
+            wish = self._numbers(name, given_wish, self._points.shape, stepped)
             if np.abs(wish[stepped]).max(initial=0.0) > FARTHEST:
                 raise WishError(f"the wish lies further than {FARTHEST:.0e} from the origin")
         rests = np.asarray(rests_in, np.float64)
