@@ -25,7 +25,7 @@ ASIDE = math.radians(40.0)
 """It leads elsewhere where it leads more than this to the side."""
 
 NEAR = 0.1
-"""Who stands no further than this from where one should stand stays there, metres."""
+"""Errors below this are no reason to turn round, and below twice as much none to leave where one stands, metres."""
 
 AT_REST = 1e-3
 """Who comes to stand and is slower than this stands, m/s."""
@@ -109,6 +109,10 @@ def follow(
                 if n - 1 == first:
                     fx, fz = (rx - vx) / dt + k * k * ex, (rz - vz) / dt + k * k * ez
                 wish_t, wish_l = fx * sine + fz * cosine, fx * cosine - fz * sine
+                if speed < SLOW:
+                    # at a creep the turn that makes up for a centimetre would be a sharp one
+                    own = ((rx - qx) * cosine - (rz - qz) * sine) / dt
+                    wish_l = own + (wish_l - own) * (speed / SLOW) ** 2
                 share = 0.0
                 if len(jerks) > 1:
                     share = min(max((speed - fades[0]) / (fades[1] - fades[0]), 0.0), 1.0)
@@ -122,7 +126,7 @@ def follow(
                 uz = (reference[later, 1] - pz) / AHEAD + far * ez
                 along, across = ux * sine + uz * cosine, ux * cosine - uz * sine
                 leaving = math.hypot(reference[later, 0] - px, reference[later, 1] - pz) > 0.5 * NEAR
-                hold = standing[n] and not leaving and away < NEAR and speed < SLOW
+                hold = standing[n] and not leaving and away < 2.0 * NEAR and speed < SLOW
                 if hold:
                     wish_t, wish_l, side = -4.0 * speed if speed > 0.02 else -speed / dt, 0.0, 0.0
                 elif speed < SLOW and abs(math.atan2(across, along)) > ASIDE and math.hypot(ux, uz) > 0.1:
