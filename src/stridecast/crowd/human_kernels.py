@@ -25,7 +25,7 @@ ASIDE = math.radians(40.0)
 """It leads elsewhere where it leads more than this to the side."""
 
 NEAR = 0.1
-"""Who stands no further than this from where one should stand stays there, metres."""
+"""Errors below this are no reason to turn round, and below twice as much none to leave where one stands, metres."""
 
 AT_REST = 1e-3
 """Who comes to stand and is slower than this stands, m/s."""
@@ -35,6 +35,12 @@ AHEAD = 0.4
 
 HASTE, HASTE_SHARE = 0.5, 0.25
 """Who is behind by more than the one, metres, hurries as if it were that (1 m/s), or the share of the way if more."""
+
+CREEP = 0.2
+"""Below this speed turns become wider, as the bound on turning vanishes faster than a force can be taken back, m/s."""
+
+EASED = 0.7
+"""Share of the bound on jerk with which people come to rest, and to their greatest speed."""
 
 KEPT = 0.985
 """Share of the bounds that is used; the rest is for bounds that change with speed within a frame."""
@@ -109,23 +115,27 @@ def follow(
                 if n - 1 == first:
                     fx, fz = (rx - vx) / dt + k * k * ex, (rz - vz) / dt + k * k * ez
                 wish_t, wish_l = fx * sine + fz * cosine, fx * cosine - fz * sine
+                if speed < SLOW:
+                    # at a creep the turn that makes up for a centimetre would be a sharp one
+                    own = ((rx - qx) * cosine - (rz - qz) * sine) / dt
+                    wish_l = own + (wish_l - own) * (speed / SLOW) ** 2
                 share = 0.0
                 if len(jerks) > 1:
                     share = min(max((speed - fades[0]) / (fades[1] - fades[0]), 0.0), 1.0)
                 jerk = KEPT * mixed(jerks, share)
                 low, high = KEPT * mixed(tangential[:, 0], share), KEPT * mixed(tangential[:, 1], share)
-                wide = KEPT * mixed(lateral_per_speed, share)
+                wide = KEPT * mixed(lateral_per_speed, share) * min(1.0, speed / CREEP)
 
                 later = min(n + ahead_of, last - 1)
                 far = 2.0 * max(1.0 - NEAR / away, 0.0) if away > 0.0 else 0.0
                 ux = (reference[later, 0] - px) / AHEAD + far * ex
                 uz = (reference[later, 1] - pz) / AHEAD + far * ez
                 along, across = ux * sine + uz * cosine, ux * cosine - uz * sine
-                leaving = math.hypot(reference[later, 0] - px, reference[later, 1] - pz) > 0.5 * NEAR
-                hold = standing[n] and not leaving and away < NEAR and speed < SLOW
+                leaving = math.hypot(reference[later, 0] - px, reference[later, 1] - pz) > NEAR
+                hold = standing[n] and not leaving and away < 2.0 * NEAR and speed < SLOW
                 if hold:
                     wish_t, wish_l, side = -4.0 * speed if speed > 0.02 else -speed / dt, 0.0, 0.0
-                elif speed < SLOW and abs(math.atan2(across, along)) > ASIDE and math.hypot(ux, uz) > 0.1:
+                elif speed < SLOW and abs(math.atan2(across, along)) > ASIDE and math.hypot(ux, uz) > TURNING_SPEED:
                     wish_t, wish_l, side = pull(
                         along, across, speed, TURNING_SPEED, max(TURNING_SPEED, 0.6 * SLOW), 6.0, jerk, side, dt
                     )
@@ -133,7 +143,7 @@ def follow(
                     side = 0.0
                 had_t, had_l = ax * sine + az * cosine, ax * cosine - az * sine
                 t, lateral, _, _, _, _ = limit(
-                    wish_t, wish_l, had_t, had_l, speed, jerk, jerk, low, high, wide, 0.0, KEPT * fastest, dt
+                    wish_t, wish_l, had_t, had_l, speed, jerk, EASED * jerk, low, high, wide, 0.0, KEPT * fastest, dt
                 )
                 if hold and speed < AT_REST and math.hypot(speed / dt + had_t, had_l) < jerk * dt:
                     t, lateral = -speed / dt, 0.0
