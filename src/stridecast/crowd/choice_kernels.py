@@ -69,7 +69,7 @@ KEEP = 0.3
 MANY = 6
 """So many are many."""
 
-JAM_LEFT_ALONE = 0.7
+JAM_LEFT_ALONE = 0.35
 """The same of people who block each other: they need the room, metres."""
 
 TURN = 0.15

@@ -14,7 +14,15 @@ from stridecast.crowd.rules import GIVE_WAY, HELD, ON_THE_WAY, RETURN, STAND, WA
 from stridecast.crowd.safety_kernels import HAIR, apart, clear_of_ground
 from stridecast.crowd.state import Cells, Ground, Limits, Moving, People, Scratch, Ways
 from stridecast.crowd.vehicle_kernels import REST, advance, stop
-from stridecast.crowd.way_kernels import company_pace, find_place, place_at, wanted, way_out
+from stridecast.crowd.way_kernels import (
+    RETREAT_SPEED,
+    company_pace,
+    find_place,
+    place_at,
+    round_the_jam,
+    wanted,
+    way_out,
+)
 from stridecast.geometry.kernels import kernel
 
 SIGHT = 16.0
@@ -45,18 +53,11 @@ PATIENCE = 1.5
 STUCK = 0.7
 """Who has not got on for so long and is blocked by somebody who wants to go elsewhere is in a jam, seconds."""
 
-ROOM = 0.5
-"""Behind people who block each other everybody steps back until there is so much room, metres ..."""
+LEAST_ROOM = 0.12
+"""With less room in a direction nobody goes round a jam, metres."""
 
-STEP_BACK = 0.6
-"""... for so long at a time, seconds."""
-
-STEPPING_BACK = 0.35
-"""... as far as they do not go round: the part of them who step back."""
-
-ROUND, GOING_ROUND = math.radians(75.0), 2.0
-"""People who block each other all go to the same side, so that the jam begins to turn: how far, and for how long
-(seconds)."""
+LONGEST_RETREAT = 2.5
+"""So long people go round a jam before they try again, seconds."""
 
 BLOCKED = 1.0
 """Who is nearer than this in front blocks the way, metres."""
@@ -253,15 +254,27 @@ def decide(
             if not (moving.jammed_next[c] or opposed):
                 patience *= QUEUING
             elif moving.jammed_next[c]:
-                narrow = math.hypot(o[PX], o[PZ]) - people.radius[c] - o[RADIUS] < ROOM
-                back = narrow and not opposed and luck < STEPPING_BACK
-                angle = math.pi if back else ROUND * (people.side[c] if people.side[c] != 0.0 else -1.0)
-                sine, cosine = math.sin(angle), math.cos(angle)
-                dx, dz = dx * cosine + dz * sine, dz * cosine - dx * sine
-                moving.retreat[c] = STEP_BACK if back else GOING_ROUND * (0.6 + 0.8 * luck)
-                moving.retreat_way[c, 0], moving.retreat_way[c, 1] = dx, dz
-                rule, most, side = GIVE_WAY, np.inf, 0.0
-                moving.stuck[c] = 0.5 * STUCK
+                side = people.side[c] if people.side[c] != 0.0 else -1.0
+                bx, bz, space = round_the_jam(
+                    ground,
+                    things,
+                    standing,
+                    seen,
+                    count,
+                    moving.position[c, 0],
+                    moving.position[c, 1],
+                    people.radius[c],
+                    dx,
+                    dz,
+                    side,
+                    luck,
+                )
+                moving.stuck[c] = 0.0
+                side, patience = 0.0, np.inf
+                if space > LEAST_ROOM:
+                    dx, dz, rule, most = bx, bz, GIVE_WAY, np.inf
+                    moving.retreat[c] = min(space / RETREAT_SPEED, LONGEST_RETREAT)
+                    moving.retreat_way[c, 0], moving.retreat_way[c, 1] = bx, bz
         if moving.stuck[c] > patience:
             bx, bz, space = way_out(
                 ground,

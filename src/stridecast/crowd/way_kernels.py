@@ -23,6 +23,10 @@ BRAKING = 0.7
 RETREAT_SPEED = 0.5
 """Who makes room does so at this speed, m/s."""
 
+ROUND = np.radians(np.array([75.0, 45.0, 105.0, -60.0, 180.0]))
+ROUND_GAIN = np.array([0.45, 0.35, 0.35, 0.0, 0.15])
+"""How people go round a jam, to their side, and what they like about it besides the room."""
+
 AROUND = 16
 """Directions in which room is looked for."""
 
@@ -152,5 +156,38 @@ def way_out(
         facing = ax * dx + az * dz
         value = way - 0.6 * max(facing, 0.0) - 0.3 * max(-facing - 0.5, 0.0)
         if value > best:
+            best, bx, bz, space = value, ax, az, way
+    return bx, bz, space
+
+
+@kernel
+def round_the_jam(
+    ground: Ground,
+    things: np.ndarray,
+    standing: int,
+    seen: np.ndarray,
+    count: int,
+    x: float,
+    z: float,
+    radius: float,
+    dx: float,
+    dz: float,
+    side: float,
+    luck: float,
+) -> tuple[float, float, float]:
+    """Direction in which somebody goes round people who block each other, and how much room there is, metres.
+
+    All go round to the same side, so that the jam begins to turn; where there is no room, to the other side, or back.
+    """
+    best, bx, bz, space = -1e18, dx, dz, 0.0
+    for k in range(len(ROUND)):
+        angle = side * ROUND[k]
+        sine, cosine = math.sin(angle), math.cos(angle)
+        ax, az = dx * cosine + dz * sine, dz * cosine - dx * sine
+        way = free_way(ground, things, standing, x, z, ax, az, radius + 0.01, 1.2)
+        for m in range(count):
+            way = disc_way(seen[m, PX], seen[m, PZ], ax, az, radius + seen[m, RADIUS] + 0.01, way)
+        value = min(way, 0.6) + ROUND_GAIN[k] + 0.25 * ((luck * (7.0 + k)) % 1.0)
+        if way > 0.0 and value > best:
             best, bx, bz, space = value, ax, az, way
     return bx, bz, space
