@@ -1,4 +1,4 @@
-"""Which segment comes next, and of which examples it is blended (KS05, KS07 "Adding Details")."""
+"""Which segment comes next, and of which examples it is blended (KS05, KS07 "Adding Details"; style: BJL 4.1)."""
 
 from __future__ import annotations
 
@@ -20,6 +20,16 @@ AHEAD = 0.22
 
 POSE_SCALE = 0.12
 """... and as much as a pose that differs by this on average, radians."""
+
+STYLE_SCALE = 0.3
+"""... and as much as a style that differs by this."""
+
+STYLE_TOLERANCE = 0.2
+"""A blend whose style is off by no more is left as it is."""
+
+NEARBY, FAR = 8.0, 16.0
+"""Examples are called in for their style alone where they are no further off than the first of these (squared distance)
+beyond what would be chosen otherwise; less and less up to the second."""
 
 ENTRY_TOLERANCE = 0.2
 """A transition can begin this far outside the speeds at which its examples began, m/s."""
@@ -115,8 +125,11 @@ def first_group(tables: Tables, state: State, c: int, request: int) -> int:
 
 
 @kernel
-def distance(tables: Tables, state: State, c: int, e: int) -> float:
-    """Squared distance of an example's beginning from what the character does: vehicle and pose."""
+def distance(tables: Tables, state: State, c: int, e: int, style: float, most: float) -> float:
+    """Squared distance of an example's beginning from what the character does, and in style: vehicle, style, pose.
+
+    What is ``most`` or more is not worked out to the end.
+    """
     vx, vz = state.velocity[c, 0], state.velocity[c, 1]
     ax, az = state.acceleration[c, 0], state.acceleration[c, 1]
     sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
@@ -124,7 +137,10 @@ def distance(tables: Tables, state: State, c: int, e: int) -> float:
     a = (math.hypot(vx, vz) - tables.parameters[e, 0] + AHEAD * more) / SPEED_SCALE
     b = more / TANGENTIAL_SCALE
     d = (ax * cosine - az * sine - tables.parameters[e, 2]) / LATERAL_SCALE
-    total = a * a + b * b + d * d
+    s = (tables.styles[e] - style) / STYLE_SCALE
+    total = a * a + b * b + d * d + s * s
+    if total >= most:
+        return total
     pose = 0.0
     for k in range(tables.features.shape[2]):
         gap = tables.features[e, MARGIN, k] - state.features[c, k]
@@ -135,39 +151,89 @@ def distance(tables: Tables, state: State, c: int, e: int) -> float:
 @kernel
 def nearest(tables: Tables, state: State, c: int, h: int) -> float:
     """Smallest distance to any example of a group."""
-    best = 1e18
+    best, style = 1e18, style_in(tables, state, c, h)
     for e in range(tables.first[h], tables.first[h] + tables.sizes[h]):
         if tables.allowed[e]:
-            best = min(best, distance(tables, state, c, e))
+            best = min(best, distance(tables, state, c, e, style, best))
     return best
 
 
 @kernel
-def blend_nearest(tables: Tables, state: State, c: int, h: int) -> None:
-    """Weights over the nearest examples of a group: 1/d2 less what the first one left out would get (BJL eq. 3).
+def style_in(tables: Tables, state: State, c: int, h: int) -> float:
+    """The style wanted, or what comes nearest to it in a group."""
+    return min(max(state.style[c], tables.style_range[h, 0]), tables.style_range[h, 1])
 
-    So weights fall to nothing where a neighbour drops out of the blend, and an exact hit takes all the weight.
+
+@kernel
+def blend_nearest(tables: Tables, state: State, c: int, h: int) -> None:
+    """Weights over the nearest examples of a group; where they miss the style wanted, over those on both sides of it."""
+    style = style_in(tables, state, c, h)
+    choose(tables, state, c, h, style, -2.0, 2.0, 0, NEIGHBOURS)
+    shown = shown_style(tables, state, c)
+    if abs(shown - style) <= STYLE_TOLERANCE:
+        return
+    # In between what there is: the other side is called in too, so that together they show the style wanted.
+    half = NEIGHBOURS // 2
+    near = distance(tables, state, c, state.chosen[c, 0], tables.styles[state.chosen[c, 0]], 1e18)
+    for n in range(half, NEIGHBOURS):
+        state.weights[c, n] = 0.0
+    total = state.weights[c, :half].sum()
+    for n in range(half):
+        state.weights[c, n] /= total
+    shown = shown_style(tables, state, c)
+    if shown < style:
+        choose(tables, state, c, h, style, style - 1e-9, 2.0, half, NEIGHBOURS - half)
+    else:
+        choose(tables, state, c, h, style, -2.0, style + 1e-9, half, NEIGHBOURS - half)
+    other = 0.0
+    for n in range(half, NEIGHBOURS):
+        other += state.weights[c, n] * tables.styles[state.chosen[c, n]]
+    share = 0.0 if other == shown else min(max((style - shown) / (other - shown), 0.0), 1.0)
+    e = state.chosen[c, half]
+    further = distance(tables, state, c, e, tables.styles[e], 1e18) - near
+    share *= min(max((FAR - further) / (FAR - NEARBY), 0.0), 1.0)
+    for n in range(NEIGHBOURS):
+        state.weights[c, n] *= share if n >= half else 1.0 - share
+
+
+@kernel
+def shown_style(tables: Tables, state: State, c: int) -> float:
+    """Style of the examples chosen, on average."""
+    shown = 0.0
+    for n in range(NEIGHBOURS):
+        shown += state.weights[c, n] * tables.styles[state.chosen[c, n]]
+    return shown
+
+
+@kernel
+def choose(
+    tables: Tables, state: State, c: int, h: int, style: float, low: float, high: float, slot: int, count: int
+) -> None:
+    """Fill ``count`` slots with the nearest examples of a group among those of styles from ``low`` to ``high``.
+
+    Weights are 1/d2 less what the first one left out would get (BJL eq. 3). So weights fall to nothing where a
+    neighbour drops out of the blend, and an exact hit takes all the weight.
     """
-    found = np.full(NEIGHBOURS + 1, 1e18)
-    which = np.zeros(NEIGHBOURS + 1, np.int64)
+    found = np.full(count + 1, 1e18)
+    which = np.zeros(count + 1, np.int64)
     for e in range(tables.first[h], tables.first[h] + tables.sizes[h]):
-        if not tables.allowed[e]:
+        if not tables.allowed[e] or not low <= tables.styles[e] <= high:
             continue
-        d = distance(tables, state, c, e) + 1e-9
-        if d >= found[NEIGHBOURS]:
+        d = distance(tables, state, c, e, style, found[count]) + 1e-9
+        if d >= found[count]:
             continue
-        k = NEIGHBOURS
+        k = count
         while k > 0 and found[k - 1] > d:
             found[k], which[k] = found[k - 1], which[k - 1]
             k -= 1
         found[k], which[k] = d, e
     total = 0.0
-    for n in range(NEIGHBOURS):
-        w = 1.0 / found[n] - 1.0 / found[NEIGHBOURS] if found[n] < 1e17 else 0.0
+    for n in range(count):
+        w = 1.0 / found[n] - 1.0 / found[count] if found[n] < 1e17 else 0.0
         if n == 0:
             w = max(w, 1e-12)
-        state.chosen[c, n] = which[n]
-        state.weights[c, n] = w
+        state.chosen[c, slot + n] = which[n]
+        state.weights[c, slot + n] = w
         total += w
-    for n in range(NEIGHBOURS):
+    for n in range(slot, slot + count):
         state.weights[c, n] /= total

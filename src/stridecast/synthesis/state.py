@@ -39,6 +39,8 @@ class State(NamedTuple):
     made_up: Array  # C, transitions that had no example
     # size of movement
     size: Array  # C 3: share of what exaggerated movements add, how fast it changes, the share wanted
+    # style
+    style: Array  # C, the one wanted, from gloomy (-1) to brisk (+1)
     # seams
     features: Array  # C D, of the last frame as shown; at first the pose to begin with
     before: Array  # C D, of the frame before
@@ -83,6 +85,7 @@ def make_state(count: int, tables: Tables) -> State:
         "generic": (),
         "started": (),
         "size": (3,),
+        "style": (),
         "features": (width,),
         "before": (width,),
         "seam": (width,),

@@ -17,6 +17,7 @@ from stridecast.model.database import MARGIN, MotionDatabase
 from stridecast.model.group import MotionGroup
 from stridecast.model.segment import MOTIONS, RUN, STAND
 from stridecast.model.skeleton import Skeleton
+from stridecast.synthesis.styles import example_styles, style_ranges
 
 Array = np.ndarray
 
@@ -37,6 +38,7 @@ class Tables(NamedTuple):
     parameters: Array  # E 3, speed at the first frame, mean tangential and lateral acceleration
     durations: Array  # E
     allowed: Array  # E, of the chosen subjects
+    styles: Array  # E, from gloomy (-1) to brisk (+1)
     # groups
     first: Array  # G
     sizes: Array  # G
@@ -50,6 +52,7 @@ class Tables(NamedTuple):
     from_rest: Array  # G, begins in standing
     to_rest: Array  # G, ends in it
     entry_speed: Array  # G 2
+    style_range: Array  # G 2, of its allowed examples
     jerk: Array  # G
     later_jerk: Array  # G, of the motion a group leads to if that is less
     tangential: Array  # G 2 2, first and last frame, low and high
@@ -80,7 +83,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         Nobody of that name is in the database, or none of their motions can be walked with.
     """
     examples, groups = database.examples, database.groups
-    allowed = _allowed(database, subject)
+    allowed, styles = _allowed(database, subject), example_styles(database)
     usable = np.array([bool(allowed[g.rows].any()) for g in groups])
     graph = connect(groups, usable)
     motions = [m for m in MOTIONS if any(u and g.motion == m for u, g in zip(usable, groups, strict=True))]
@@ -97,6 +100,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         parameters=_parameters(database),
         durations=examples.durations,
         allowed=allowed,
+        styles=styles,
         first=np.array([g.first for g in groups]),
         sizes=np.where(usable, [g.count for g in groups], 0),
         comes_from=np.array([MOTIONS.index(g.comes_from) for g in groups]),
@@ -109,6 +113,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         from_rest=np.array([g.start == "S" for g in groups]),
         to_rest=np.array([g.stop == "S" for g in groups]),
         entry_speed=entry,
+        style_range=style_ranges(styles, allowed, [g.rows for g in groups]),
         jerk=np.array([g.bounds.jerk for g in groups]),
         later_jerk=np.array([_later_jerk(g, groups) for g in groups]),
         tangential=np.array([g.bounds.tangential for g in groups]),
@@ -116,7 +121,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         speed=np.array([g.bounds.speed for g in groups]),
         rising=np.array([_rising(g) for g in groups]),
         approach=_approach(groups, entry, graph),
-        neutral=_neutral(database, allowed),
+        neutral=_neutral(database, allowed & (styles == 0.0) if (styles[allowed] == 0.0).any() else allowed),
         references=database.references,
         feature_weights=_feature_weights(skeleton),
         parents=np.array(skeleton.parents),

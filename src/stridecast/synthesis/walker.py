@@ -20,6 +20,7 @@ from stridecast.steering.kernels import JERK, LATERAL, SPEED, TANGENTIAL
 from stridecast.synthesis.sizes import AMOUNTS, enlargement
 from stridecast.synthesis.state import make_state
 from stridecast.synthesis.step_kernels import FORCE, PLAN, POINT, step_block
+from stridecast.synthesis.styles import Style, style_numbers
 from stridecast.synthesis.tables import make_tables
 
 Array = np.ndarray
@@ -60,13 +61,15 @@ class Walkers:
         Frames a second; the database's if left out.
     threads
         Threads that share the characters. The result does not depend on it.
-    size
-        Size of movement to begin with (see ``step``).
+    size, style
+        Size of movement and style to begin with (see ``step``).
 
     Raises
     ------
     InputError
         Places or headings that are no finite numbers, a frame rate outside 10 to 240 Hz.
+    WishError
+        An unknown size or style.
     DatabaseError
         Nobody called ``subject``.
     """
@@ -82,6 +85,7 @@ class Walkers:
         frame_rate: float | None = None,
         threads: int = 1,
         size: str | Sequence[str] = "neutral",
+        style: Style | Sequence[Style] | Float[Array, "characters"] = 0.0,
     ) -> None:
         places = np.array(positions, np.float64)
         if places.ndim != 2 or places.shape[1] != 2 or len(places) == 0:
@@ -114,6 +118,7 @@ class Walkers:
         self._wanted = np.zeros(len(places), np.int64)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._set_sizes(self._sizes_of(size))
+        self._state.style[:] = style_numbers(style, len(places))
 
     def __len__(self) -> int:
         return len(self._wanted)
@@ -137,6 +142,7 @@ class Walkers:
         rests_in: Float[Array, "characters"] | float = np.inf,
         motion: str | Sequence[str] = "walk",
         size: str | Sequence[str] | None = None,
+        style: Style | Sequence[Style] | Float[Array, "characters"] | None = None,
     ) -> Pose:
         """Advance by one frame. Give one of points, forces and accelerations.
 
@@ -156,17 +162,24 @@ class Walkers:
         size
             How large movements are: ``calm``, ``neutral``, ``lively`` or ``exaggerated``, one for all or one each; as
             before if left out. It changes smoothly, in about half a second.
+        style
+            In what mood to go: a number from -1 (gloomy) to 1 (brisk), or ``gloomy``, ``neutral``, ``brisk``, one for
+            all or one each; as before if left out. It acts from the next half cycle on, as far as the database shows
+            it: examples are chosen by it too.
 
         Raises
         ------
         WishError
             Not exactly one of points, forces and accelerations, wrong shape, numbers that are not finite, an unknown
-            motion or size. Nothing has changed then.
+            motion, size or style. Nothing has changed then.
         """
         sizes = None if size is None else self._sizes_of(size)
+        styles = None if style is None else style_numbers(style, len(self))
         self._take_wish(points, forces, accelerations, rests_in, motion)
         if sizes is not None:
             self._set_sizes(sizes)
+        if styles is not None:
+            self._state.style[:] = styles
         self._advance()
         return self._pose()
 
@@ -307,12 +320,20 @@ class Walker:
         gains: SteeringGains | None = None,
         frame_rate: float | None = None,
         size: str = "neutral",
+        style: Style = 0.0,
     ) -> None:
         place = np.asarray(position, np.float64)
         if place.shape != (2,):
             raise InputError(f"a position is a ground point (x, z), not an array of shape {place.shape}")
         self._batch = Walkers(
-            database, place[None], float(heading), subject=subject, gains=gains, frame_rate=frame_rate, size=size
+            database,
+            place[None],
+            float(heading),
+            subject=subject,
+            gains=gains,
+            frame_rate=frame_rate,
+            size=size,
+            style=style,
         )
 
     @property
@@ -349,6 +370,7 @@ class Walker:
         rests_in: float = np.inf,
         motion: str = "walk",
         size: str | None = None,
+        style: Style | None = None,
     ) -> Pose:
         """Advance by one frame to a ground point ``(x, z)``, by a force on a unit mass or as a plan wants (m/s2).
 
@@ -368,6 +390,7 @@ class Walker:
             rests_in=rests_in,
             motion=motion,
             size=size,
+            style=style,
         )
         v, b = pose.vehicle, pose.bounds
         return Pose(
