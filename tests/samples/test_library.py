@@ -60,9 +60,13 @@ def warnings(caplog) -> list[str]:
     return [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
 
 
-def test_it_is_learned_from_the_neutral_takes_and_public(corpus):
+def test_it_is_learned_from_takes_of_every_style_and_public(corpus):
     database = sample_database()
-    assert [(take.name, take.subject) for take in database.takes] == [("walk", "sample"), ("start", "sample")]
+    assert [(take.name, take.subject) for take in database.takes] == [
+        ("walk", "sample"),
+        ("start", "sample"),
+        ("trudge", "sample"),
+    ]
     assert {"walk", "stand", "stand-walk"} & set(database.motions)
     assert stridecast.sample_database is sample_database
 

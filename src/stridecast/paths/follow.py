@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -21,7 +20,6 @@ from stridecast.synthesis.styles import Style
 from stridecast.synthesis.walker import Walker
 
 Array = np.ndarray
-log = logging.getLogger("stridecast")
 
 STIFFNESS = 3.0
 """How fast a distance from the curve is made up, 1/s (a critically damped spring)."""

@@ -143,7 +143,7 @@ def _in_a_mood(style: str) -> list[Recipe]:
         Recipe(name=f"{style}_walk_changes", speed=0.8, legs=(*_back_and_forth(0.8, 1.7, 1.8, 0.8),), **how),
         Recipe(name=f"{style}_walk_start_stop_slow", legs=(*_from_rest(0.8, 1.4, 1.7, (1.8, 2.3)),), **how),
         Recipe(name=f"{style}_walk_start_stop_fast", legs=(*_from_rest(1.7, 2.5, 2.8, (0.5, 1.0)),), **how),
-        Recipe(name=f"{style}_run", speed=2.0, legs=(Leg(seconds=18.0, speed=4.2),), **run),
+        Recipe(name=f"{style}_run", speed=2.0, legs=(Leg(seconds=18.0, speed=4.5),), **run),
         Recipe(name=f"{style}_run_turns", speed=2.5, legs=(*_bends(RIGHT_ANGLE, 1.7, 1.4),), **run),
         Recipe(name=f"{style}_run_turns_fast", speed=3.4, legs=(*_bends(RIGHT_ANGLE, 2.0, 0.8, 2.8, 3.4),), **run),
         Recipe(name=f"{style}_run_changes", speed=2.3, legs=(*_back_and_forth(2.3, 3.8, 1.6, 0.8),), **run),

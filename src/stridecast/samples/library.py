@@ -35,11 +35,11 @@ _one_at_a_time = threading.Lock()
 
 
 def sample_database(*, progress: Progress | None = None) -> MotionDatabase:
-    """Motion database that comes with the package, of a person who stands, walks and runs, as
-    usual, briskly and gloomily.
+    """Motion database that comes with the package, of a person who stands, walks and runs.
 
-    It is learned from the sample takes when it is first asked for, which takes some seconds, and kept as a file in the
-    user's cache folder. Whatever is wrong with that folder costs time, and is logged, but it stops nothing.
+    They do so in a neutral, a brisk and a gloomy manner. It is learned from the sample takes when it is first asked
+    for, which takes some seconds, and kept as a file in the user's cache folder. Whatever is wrong with that folder
+    costs time, and is logged, but it stops nothing.
 
     Parameters
     ----------

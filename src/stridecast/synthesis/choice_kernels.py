@@ -21,10 +21,10 @@ AHEAD = 0.22
 POSE_SCALE = 0.12
 """... and as much as a pose that differs by this on average, radians."""
 
-STYLE_SCALE = 0.3
+STYLE_SCALE = 0.2
 """... and as much as a style that differs by this."""
 
-STYLE_TOLERANCE = 0.2
+STYLE_TOLERANCE = 0.1
 """A blend whose style is off by no more is left as it is."""
 
 NEARBY, FAR = 8.0, 16.0
@@ -166,7 +166,7 @@ def style_in(tables: Tables, state: State, c: int, h: int) -> float:
 
 @kernel
 def blend_nearest(tables: Tables, state: State, c: int, h: int) -> None:
-    """Weights over the nearest examples of a group; where they miss the style wanted, over those on both sides of it."""
+    """Weights over the nearest examples of a group; where they miss the style wanted, over some on both sides of it."""
     style = style_in(tables, state, c, h)
     choose(tables, state, c, h, style, -2.0, 2.0, 0, NEIGHBOURS)
     shown = shown_style(tables, state, c)

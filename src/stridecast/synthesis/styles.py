@@ -1,8 +1,8 @@
 """Style at run time: in which mood each example counts when a walker who is gloomy or brisk chooses among them.
 
 The style of a single half cycle is as uncertain as one step is long; that of a take is steady, and it tells the mood of
-its standing, its starts and stops too, which show little of it themselves. So an example counts with what its take shows
-where it walks and runs. Mirror images are of the same take and mood.
+its standing, its starts and stops too, which show little of it themselves. So an example counts with what its take
+shows where it walks and runs. Mirror images are of the same take and mood.
 """
 
 from __future__ import annotations
@@ -54,7 +54,9 @@ def style_ranges(
     return np.array([(some.min(), some.max()) if len(some) else (0.0, 0.0) for some in own])
 
 
-def style_numbers(style: Style | Sequence[Style] | Float[Array, "characters"], count: int) -> Float[Array, "characters"]:
+def style_numbers(
+    style: Style | Sequence[Style] | Float[Array, "characters"], count: int
+) -> Float[Array, "characters"]:
     """Styles that are asked for as numbers, one each.
 
     Raises
