@@ -323,7 +323,7 @@ def test_of_two_processes_at_once_one_waits_for_the_other(folder, tmp_path):
     go.touch()
     ends = [process.communicate(timeout=60)[0] for process in processes]
     assert [process.returncode for process in processes] == [0, 0], said.read_text()
-    assert sorted(ends) == ["has 2\n", "makes\nhas 2\n"]
+    assert sorted(ends) == ["has 3\n", "makes\nhas 3\n"]
     assert said.read_text() == WAITING
     assert len(kept(folder)) == 1
 
@@ -337,6 +337,6 @@ def test_a_process_that_is_killed_keeps_nobody_waiting(folder, tmp_path):
     first.kill()
     first.communicate(timeout=30)
     go.touch()
-    assert second.communicate(timeout=60)[0] == "makes\nhas 2\n"
+    assert second.communicate(timeout=60)[0] == "makes\nhas 3\n"
     assert (second.returncode, said.read_text()) == (0, WAITING)
     assert len(kept(folder)) == 1

@@ -25,6 +25,7 @@ from stridecast.synthesis.choice_kernels import (
     NEARBY,
     POSE_SCALE,
     SPEED_SCALE,
+    STYLE_MOST,
     STYLE_SCALE,
     STYLE_TOLERANCE,
     TANGENTIAL_SCALE,
@@ -212,7 +213,8 @@ def twin(tables: Tables, state: State, group: int) -> np.ndarray:
     gaps = tables.features[rows, MARGIN] - state.features[0]
     alike = (off / SPEED_SCALE) ** 2 + (more / TANGENTIAL_SCALE) ** 2 + (across / LATERAL_SCALE) ** 2
     alike += 3.0 * (gaps**2 @ tables.feature_weights) / POSE_SCALE**2
-    apart = alike + ((styles - style) / STYLE_SCALE) ** 2 + 1e-9
+    off = ((styles - style) / STYLE_SCALE) ** 2
+    apart = alike + off / (1 + off / STYLE_MOST) + 1e-9
 
     def weights(which: np.ndarray, count: int) -> np.ndarray:
         order = which[np.argsort(apart[which], kind="stable")]
@@ -294,7 +296,7 @@ def without_turns(database: MotionDatabase) -> Tables:
 def test_what_nobody_did_in_a_mood_is_done_as_others_do_it(sample_person):
     tables = without_turns(sample_person)
     group = list(sample_person.by_name).index("walk/LDR")
-    for lateral in (-1.3, 0.0, 1.3):
+    for lateral in (-2.0, 0.0, 2.0):
         found = {}
         for style in (0.0, 1.0):
             state = make_state(1, tables)

@@ -22,12 +22,15 @@ POSE_SCALE = 0.12
 """... and as much as a pose that differs by this on average, radians."""
 
 STYLE_SCALE = 0.2
-"""... and as much as a style that differs by this."""
+"""... and as much as a style that differs by this; ..."""
+
+STYLE_MOST = 16.0
+"""... but no difference in style weighs more than this in a squared distance: a sharp turn is one in any mood."""
 
 STYLE_TOLERANCE = 0.1
 """A blend whose style is off by no more is left as it is."""
 
-NEARBY, FAR = 8.0, 16.0
+NEARBY, FAR = 3.0, 7.0
 """Examples are called in for their style alone where they are no further off than the first of these (squared distance)
 beyond what would be chosen otherwise; less and less up to the second."""
 
@@ -138,7 +141,7 @@ def distance(tables: Tables, state: State, c: int, e: int, style: float, most: f
     b = more / TANGENTIAL_SCALE
     d = (ax * cosine - az * sine - tables.parameters[e, 2]) / LATERAL_SCALE
     s = (tables.styles[e] - style) / STYLE_SCALE
-    total = a * a + b * b + d * d + s * s
+    total = a * a + b * b + d * d + s * s / (1.0 + s * s / STYLE_MOST)
     if total >= most:
         return total
     pose = 0.0
