@@ -19,11 +19,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import peers
 import shapely
 
+import peers
 import stridecast as sc
 from stridecast.model.scene import Circle, Scene
+from stridecast.paths.generate import generate_path
 from stridecast.scorecard.crowds import CrowdScore, score_crowd
 from stridecast.scorecard.travel import REACH
 
@@ -63,7 +64,6 @@ def plain(scene: Scene, seed: int) -> Plain:
 def way(scene: Scene, person: Any) -> float | None:
     """Length of the planned way of somebody alone who cannot go straight, metres; nothing for all others."""
     from stridecast.crowd.population import task_of
-    from stridecast.paths.generate import generate_path
 
     walls = [shapely.LineString(wall.points) for wall in scene.walls]
     solid = shapely.union_all([*walls, *(shapely.Polygon(o.points) for o in scene.obstacles if hasattr(o, "points"))])

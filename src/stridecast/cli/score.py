@@ -45,7 +45,7 @@ def score(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON.")] = False,
 ) -> None:
-    """Measure trajectories of crowds (overlaps, deadlocks, times, ways, smoothness) or motions of bodies (feet, knees)."""
+    """Measure trajectories of crowds (overlaps, deadlocks, times, ways) or motions of bodies (feet, knees)."""
     from stridecast.cli import screen
     from stridecast.formats.recordings import RECORDINGS, load_motion
     from stridecast.scorecard.motion import score_motion
