@@ -66,7 +66,7 @@ def test_a_table_tells_of_a_crowd(walked, file):
     text = call("score", file, "--bounds", "60,4,3,1.8,1.0").stdout
     for words in (
         "3 for 4.0 s at 30 Hz (363 samples)",
-        "1 pairs in 121 frames; deepest 1 and 2 8.0 cm at",
+        "pairs: 1, in 121 frames; deepest 1 and 2 8.0 cm at",
         "no goals known",
         "beyond the bounds: speed",
         "360 (100.00 %) of 3 people, up to 1.20 times",

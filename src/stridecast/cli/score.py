@@ -153,12 +153,12 @@ def _crowd_table(path: Path, score: CrowdScore) -> Table:
         "people", f"{score.people} for {score.seconds:.1f} s at {score.frame_rate:.4g} Hz ({score.samples} samples)"
     )
     for name, found in (("overlaps", score.overlaps), ("overlaps with the scene", score.solid_overlaps)):
-        text = f"{found.pairs} pairs in {found.frames} frames"
+        text = f"pairs: {found.pairs}, in {found.frames} frames"
         worst = [f"{o.one} and {o.other} {100 * o.depth:.1f} cm at {o.time:.2f} s" for o in found.each[:WORST_SHOWN]]
         table.add_row(name, escape("none" if not found.pairs else f"{text}; deepest {', '.join(worst)}"))
     stuck = [f"{d.person} from {d.first:.1f} to {d.last:.1f} s" for d in score.deadlocks[:WORST_SHOWN]]
     ended = sum(d.resolved for d in score.deadlocks)
-    groups = f", {len(score.blocking_groups)} groups block each other" if score.blocking_groups else ""
+    groups = ", some block each other" if score.blocking_groups else ""
     table.add_row(
         "deadlocks",
         f"{len(score.deadlocks)} ({ended} resolved{groups}): {', '.join(stuck)}" if stuck else "none",
