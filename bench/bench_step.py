@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import stridecast as sc
+from stridecast.model.pose import VehicleState
 
 HERE = Path(__file__).resolve().parent
 TAKES = ("16_15", "16_17", "16_27", "16_31", "16_33", "16_35", "16_41", "16_08", "16_55", "127_04")
@@ -63,3 +64,31 @@ def test_step_of_many_characters(benchmark, database, characters, threads):
         step()
     benchmark(step)
     benchmark.extra_info["characters_per_second"] = round(characters / benchmark.stats["median"])
+
+
+@pytest.mark.parametrize("driven_by", ["points", "vehicles"])
+def test_step_of_a_batch(benchmark, database, driven_by):
+    """Microseconds a character and frame of 256 who walk, turn and change their speed."""
+    count = 256
+    rng = np.random.default_rng(0)
+    places, speeds = rng.uniform(-20, 20, (count, 2)), rng.uniform(0.2, 1.7, count)
+    headings, turning = rng.uniform(-np.pi, np.pi, count), rng.uniform(-0.8, 0.8, count)
+    walkers = sc.Walkers(database, places, headings)
+    walks, zero = np.ones(count, int), np.zeros((count, 2))
+    at, frame = places.copy(), iter(range(10**9))
+
+    def step():
+        nonlocal at
+        now = headings + turning * next(frame) / 30
+        velocity = speeds[:, None] * np.stack((np.sin(now), np.cos(now)), axis=-1)
+        at = at + velocity / 30
+        if driven_by == "points":
+            walkers.step(at, motion=walks)
+        else:
+            vehicles = VehicleState(position=at, velocity=velocity, acceleration=zero, heading=now)
+            walkers.step(vehicles=vehicles, motion=walks)
+
+    for _ in range(60):
+        step()
+    benchmark(step)
+    benchmark.extra_info["microseconds_per_character"] = round(1e6 * benchmark.stats["median"] / count, 2)

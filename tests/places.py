@@ -43,11 +43,11 @@ def scene(start, goals, obstacles=(), roads=(), side="none", distance="near", **
 
 
 def solids(place: Scene) -> list[shapely.Geometry]:
-    """Obstacles, circles as polygons that are no more than a thousandth too small."""
+    """Obstacles, circles as polygons that are no more than a thousandth too small, and walls as thin as they are."""
     return [
         shapely.Point(o.center).buffer(o.radius, quad_segs=64) if isinstance(o, Circle) else shapely.Polygon(o.points)
         for o in place.obstacles
-    ]
+    ] + [shapely.LineString(wall.points) for wall in place.walls]
 
 
 def ground(place: Scene) -> shapely.Geometry | None:

@@ -141,7 +141,7 @@ def test_a_scene_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch
 
 
 @pytest.mark.parametrize("name", ["road", "square"])
-def test_the_scenes_of_the_examples_have_ways(name):
+def test_the_walkers_scenes_of_the_examples_have_ways(name):
     path = generate_path(load_scene(ROOT / "examples" / "scenes" / f"{name}.yaml"))
     assert path.inserted
     assert np.abs(path.curve.curvatures).max() < 3

@@ -161,7 +161,10 @@ def _crowd_table(path: Path, score: CrowdScore) -> Table:
     groups = ", some block each other" if score.blocking_groups else ""
     table.add_row(
         "deadlocks",
-        f"{len(score.deadlocks)} ({ended} resolved{groups}): {', '.join(stuck)}" if stuck else "none",
+        f"{len({d.person for d in score.deadlocks})} people, {len(score.deadlocks)} stands ({ended} resolved{groups}): "
+        f"{', '.join(stuck)}"
+        if stuck
+        else "none",
     )
     goals = int(way.has_goal.sum())
     table.add_row("arrived", f"{way.arrived} of {goals}" if goals else "no goals known")

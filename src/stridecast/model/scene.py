@@ -2,95 +2,47 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from stridecast.errors import SceneError
-from stridecast.model.segment import RUN, WALK
+from stridecast.model.behavior import (
+    DISTANCES,
+    PATIENCE,
+    SIDES_OF_WAY,
+    SIZES,
+    USUAL_WEIGHT,
+    Behavior,
+    Preference,
+    ground_points,
+)
+from stridecast.model.people import LARGEST_GROUP, Mover, Person, Source, Wall
+
+__all__ = [
+    "DISTANCES",
+    "PATIENCE",
+    "SIDES_OF_WAY",
+    "SIZES",
+    "USUAL_WEIGHT",
+    "Behavior",
+    "Circle",
+    "Mover",
+    "Obstacle",
+    "Person",
+    "Polygon",
+    "Preference",
+    "Road",
+    "Scene",
+    "Source",
+    "Station",
+    "Wall",
+]
 
 Array = np.ndarray
-
-SIDES_OF_WAY = ("none", "left", "right")
-DISTANCES = ("near", "far")
-PATIENCE = ("wait", "go")
-SIZES = ("calm", "neutral", "lively", "exaggerated")
-"""Size of movement: gains per frequency band over the joint curves (BJL's status; Bruderlin and Williams 1995)."""
-
-USUAL_WEIGHT = 70.0
-"""Of whom turns are as wide as their speed asks for, kilograms."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Preference:
-    """What somebody does where there is a choice.
-
-    Parameters
-    ----------
-    side
-        Passes obstacles and people on the ``left`` or ``right``; ``none``: whichever is shorter.
-    distance
-        Keeps ``near`` to what is passed, or ``far``.
-    patience
-        Would rather ``wait`` for what moves, or ``go`` first.
-    """
-
-    side: str = "none"
-    distance: str = "near"
-    patience: str = "go"
-
-    def __post_init__(self) -> None:
-        for name, known in (("side", SIDES_OF_WAY), ("distance", DISTANCES), ("patience", PATIENCE)):
-            value = getattr(self, name)
-            if value not in known:
-                raise SceneError(f"preference.{name} is one of {', '.join(known)}, not {value!r}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Behavior:
-    """How somebody goes (BJL's behavior parameters).
-
-    Parameters
-    ----------
-    velocity
-        Wished speed, m/s.
-    weight
-        Kilograms: the heavier and faster, the wider the turns (BJL eq. 1).
-    status
-        ``walk`` or ``run``.
-    size
-        How large movements are: one of ``SIZES``.
-    style
-        From gloomy (-1) to brisk (1); 0 is neutral. Mining answers to it; walkers do not yet, and say so.
-    preference
-        What is done where there is a choice.
-    body_radius
-        Half the width that is kept free, metres.
-    """
-
-    velocity: float = 1.3
-    weight: float = USUAL_WEIGHT
-    status: str = WALK
-    size: str = "neutral"
-    style: float = 0.0
-    preference: Preference = field(default_factory=Preference)
-    body_radius: float = 0.3
-
-    def __post_init__(self) -> None:
-        for name, low, high in (
-            ("velocity", 0.1, 12.0),
-            ("weight", 20.0, 300.0),
-            ("style", -1.0, 1.0),
-            ("body_radius", 0.05, 2.0),
-        ):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and low <= value <= high):
-                raise SceneError(f"{name} must lie between {low:g} and {high:g}, not at {value}")
-        if self.status not in (WALK, RUN):
-            raise SceneError(f"status is {WALK} or {RUN}, not {self.status!r}")
-        if self.size not in SIZES:
-            raise SceneError(f"size is one of {', '.join(SIZES)}, not {self.size!r}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -102,7 +54,7 @@ class Road:
     width: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", _points(self.points, f"road {self.name!r}", 2))
+        object.__setattr__(self, "points", ground_points(self.points, f"road {self.name!r}", 2))
         if not (np.isfinite(self.width) and self.width > 0):
             raise SceneError(f"road {self.name!r} must have a width above 0 m, not {self.width}")
         if (np.linalg.norm(np.diff(self.points, axis=0), axis=-1) < 1e-6).any():
@@ -118,7 +70,7 @@ class Circle:
     radius: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", _points([self.center], f"obstacle {self.name!r}", 1)[0])
+        object.__setattr__(self, "center", ground_points([self.center], f"obstacle {self.name!r}", 1)[0])
         if not (np.isfinite(self.radius) and self.radius > 0):
             raise SceneError(f"obstacle {self.name!r} must have a radius above 0 m, not {self.radius}")
 
@@ -131,7 +83,7 @@ class Polygon:
     points: Float[Array, "points 2"]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", _points(self.points, f"obstacle {self.name!r}", 3))
+        object.__setattr__(self, "points", ground_points(self.points, f"obstacle {self.name!r}", 3))
 
 
 Obstacle = Circle | Polygon
@@ -174,50 +126,99 @@ class Station:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scene:
-    """A place and a task.
+    """A place and a task: for one walker, for a crowd, or for both.
 
     Parameters
     ----------
     start
-        Ground point ``(x, z)``, metres.
+        Ground point ``(x, z)`` of the one walker, metres; nothing where there is none.
     goals
-        One or more points, reached in this order.
+        One or more points, reached in this order; none where there is no walker.
     roads
         Where one may go; anywhere if there is none.
     obstacles
         What is in the way.
     behavior
-        How to go.
+        How the walker goes.
     stations
         Where that changes.
+    walls
+        Thin lines that are in the way too.
+    movers
+        Obstacles that move, for crowds; the one walker's path does not know them.
+    people
+        Who is there by name.
+    sources
+        Where more come from.
+    seconds
+        How long it lasts; as long as somebody is on the way where nothing is said.
+    seed
+        Of all that is drawn by chance.
     """
 
-    start: Float[Array, "2"]
-    goals: Float[Array, "goals 2"]
+    start: Float[Array, "2"] | None = None
+    goals: Float[Array, "goals 2"] = field(default_factory=lambda: np.zeros((0, 2)))
     roads: tuple[Road, ...] = ()
     obstacles: tuple[Obstacle, ...] = ()
     behavior: Behavior = field(default_factory=Behavior)
     stations: tuple[Station, ...] = ()
+    walls: tuple[Wall, ...] = ()
+    movers: tuple[Mover, ...] = ()
+    people: tuple[Person, ...] = ()
+    sources: tuple[Source, ...] = ()
+    seconds: float | None = None
+    seed: int = 0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", _points([self.start], "start", 1)[0])
-        object.__setattr__(self, "goals", _points(self.goals, "goals", 1))
-        seen: set[str] = set()
-        for thing in (*self.roads, *self.obstacles):
-            if thing.name in seen:
-                raise SceneError(f"two roads or obstacles are called {thing.name!r}; names must differ")
-            seen.add(thing.name)
+        crowd = bool(self.people or self.sources)
+        if self.start is None:
+            if len(self.goals):
+                raise SceneError("there are goals but no start")
+            if not crowd:
+                raise SceneError("nobody is there: start and goals, people or sources are needed")
+        else:
+            object.__setattr__(self, "start", ground_points([self.start], "start", 1)[0])
+        least = 0 if self.start is None else 1
+        goals = self.goals if least else np.zeros((0, 2))
+        object.__setattr__(self, "goals", ground_points(goals, "goals", least))
+        if self.seconds is not None and not (np.isfinite(self.seconds) and self.seconds > 0):
+            raise SceneError(f"seconds must be a finite number above 0, not {self.seconds}")
+        if not 0 <= self.seed < 2**32:
+            raise SceneError(f"seed must be a whole number from 0 to {2**32 - 1}, not {self.seed}")
+        seen: dict[str, str] = {}
+        for kind, name in self._names():
+            if name in seen:
+                raise SceneError(f"two things are called {name!r}, {seen[name]} and {kind}; names must differ")
+            seen[name] = kind
+        for word, count in Counter(p.together for p in self.people if p.together is not None).items():
+            if not 2 <= count <= LARGEST_GROUP:
+                raise SceneError(f"together {word!r} is the word of {count}; 2 to {LARGEST_GROUP} people walk together")
 
+    @property
+    def has_walker(self) -> bool:
+        """Whether there is a start and a goal for a single walker."""
+        return self.start is not None
 
-def _points(values: object, what: str, least: int) -> Array:
-    """Ground points as an array that cannot be changed."""
-    try:
-        out = np.array(values, np.float64)
-    except (TypeError, ValueError):
-        raise SceneError(f"{what}: points are pairs of numbers (x, z)") from None
-    if out.ndim != 2 or out.shape[1] != 2 or len(out) < least:
-        raise SceneError(f"{what}: {least} or more points (x, z) are needed, not an array of shape {out.shape}")
-    if not np.isfinite(out).all():
-        raise SceneError(f"{what}: point {int(np.flatnonzero(~np.isfinite(out).all(axis=1))[0])} is not finite")
-    out.setflags(write=False)
-    return out
+    def task(self) -> tuple[Float[Array, "2"], Float[Array, "goals 2"]]:
+        """Start and goals of the one walker.
+
+        Raises
+        ------
+        SceneError
+            There are none.
+        """
+        if self.start is None:
+            raise SceneError("the scene has no start and goals for a single walker, only people and sources of people")
+        return self.start, self.goals
+
+    def _names(self) -> Iterator[tuple[str, str]]:
+        for kind, things in (
+            ("road", self.roads),
+            ("obstacle", self.obstacles),
+            ("wall", self.walls),
+            ("mover", self.movers),
+            ("person", self.people),
+            ("source", self.sources),
+        ):
+            for thing in things:
+                yield kind, thing.name

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -89,8 +90,6 @@ class Trajectories:
 
     def each(self) -> Iterator[tuple[int, slice]]:
         """Everybody's number and rows."""
-        edges = np.searchsorted(self.ids, self.people)
-        for person, first, last in zip(
-            self.people.tolist(), edges.tolist(), [*edges[1:].tolist(), len(self)], strict=True
-        ):
+        edges = [*np.searchsorted(self.ids, self.people).tolist(), len(self)]
+        for person, (first, last) in zip(self.people.tolist(), pairwise(edges), strict=True):
             yield person, slice(first, last)

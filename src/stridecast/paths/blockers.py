@@ -46,9 +46,10 @@ def check_reachable(space: Space) -> None:
                 else f"the edge of road {one!r} lies between"
             )
             raise PathError(f"there is no way {who}: {edges}; {needs}")
-        names = [f"obstacle {space.names[b]!r}" for b in blockers[:NAMED]]
-        if len(blockers) > NAMED:
-            names.append(f"{len(blockers) - NAMED} more")
+        labels = list(dict.fromkeys(space.labels[b] for b in blockers))  # segments of a wall share its name
+        names = labels[:NAMED]
+        if len(labels) > NAMED:
+            names.append(f"{len(labels) - NAMED} more")
         if space.has_roads and _joined(_rooms(space, blockers, by, roads=False), start, goal):
             middle = space.cores[blockers[0]].centroid
             road = space.nearest_road(np.array([middle.x, middle.y]))

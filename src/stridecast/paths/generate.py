@@ -70,7 +70,8 @@ def generate_path(scene: Scene, *, progress: Callable[[float], None] | None = No
     Raises
     ------
     SceneError
-        A polygon that is none, a start or goal where the body cannot stand, or a goal at the start.
+        No start and goals for a single walker, a polygon that is none, a start or goal where the body cannot stand, or
+        a goal at the start.
     PathError
         There is no way; the message names what is in the way.
     """

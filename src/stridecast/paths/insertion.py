@@ -12,7 +12,8 @@ from jaxtyping import Float
 from stridecast.geometry import ground
 from stridecast.model.scene import Scene
 from stridecast.paths.curve import Curve
-from stridecast.paths.space import EDGE, GOAL, Space
+from stridecast.paths.solids import EDGE
+from stridecast.paths.space import GOAL, Space
 
 Array = np.ndarray
 

@@ -13,7 +13,8 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 
 from stridecast.paths.insertion import WRONG_SIDE
-from stridecast.paths.space import EDGE, HAIR, Space
+from stridecast.paths.solids import EDGE
+from stridecast.paths.space import HAIR, Space
 
 Array = np.ndarray
 

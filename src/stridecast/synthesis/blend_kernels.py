@@ -71,6 +71,10 @@ def blended(tables: Tables, state: State, c: int, generic: float, out: np.ndarra
                 out[k] += w0 * f[i - 1, k] + w1 * f[i, k] + w2 * f[i + 1, k] + w3 * f[i + 2, k]
     if state.size[c, 0] != 0.0:
         enlarge(tables.larger, state.chosen[c], state.weights[c], state.size[c, 0], i, b, out)
+    scale = state.scale[c]
+    if scale != 1.0:
+        for k in range(len(out)):
+            out[k] = tables.neutral[k] + scale * (out[k] - tables.neutral[k])
 
 
 @kernel
@@ -97,7 +101,7 @@ def change_size(size, fresh, dt):  # type: ignore[no-untyped-def]
 @kernel
 def open_seam(tables: Tables, state: State, c: int, meant: np.ndarray, dt: float) -> None:
     """Take down by how much a new segment differs from where the last frames were heading (inertialization)."""
-    ahead = np.empty(len(meant))
+    ahead = state.ahead[c]
     du = dt / seconds_per_generic(tables, state, c)
     blended(tables, state, c, state.generic[c] + du, ahead)
     yaw = len(meant) - 1
@@ -105,7 +109,7 @@ def open_seam(tables: Tables, state: State, c: int, meant: np.ndarray, dt: float
     state.features[c, yaw] -= turns
     state.before[c, yaw] -= turns
     for k in range(len(meant)):
-        rate = (state.features[c, k] - state.before[c, k]) / dt
+        rate = (state.features[c, k] - state.before[c, k]) / state.elapsed[c]
         state.seam[c, k] = state.features[c, k] + rate * dt - meant[k]
         state.seam_rate[c, k] = rate - (ahead[k] - meant[k]) / dt
 
@@ -122,11 +126,17 @@ def show_features(state: State, c: int, meant: np.ndarray) -> None:
         state.before[c, yaw] += inside - state.features[c, yaw]
         state.features[c, yaw] = inside
     if state.fresh[c]:  # nobody knows where the first pose comes from: it is at rest
-        state.before[c] = state.features[c]
+        for k in range(len(meant)):
+            state.before[c, k] = state.features[c, k]
 
 
 @kernel
 def close_seam(state: State, c: int, dt: float) -> None:
     """Let the seam fade by one frame."""
-    for k in range(state.seam.shape[1]):
-        state.seam[c, k], state.seam_rate[c, k] = decay(state.seam[c, k], state.seam_rate[c, k], SEAM_HALF_LIFE, dt)
+    # As ``decay`` of each feature, its exponential worked out once.
+    seam, rate = state.seam[c], state.seam_rate[c]
+    y = 2.0 * math.log(2.0) / SEAM_HALF_LIFE
+    e = math.exp(-y * dt)
+    for k in range(len(seam)):
+        j = rate[k] + seam[k] * y
+        seam[k], rate[k] = e * (seam[k] + j * dt), e * (rate[k] - j * y * dt)

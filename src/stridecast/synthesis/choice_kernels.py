@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from stridecast.database.graph import UNREACHABLE
 from stridecast.geometry.kernels import kernel
 from stridecast.model.database import MARGIN
@@ -27,6 +25,9 @@ ENTRY_TOLERANCE = 0.2
 SPEED_TOLERANCE = 0.04
 """Walking and running can begin this much above their speeds, m/s: who slows down nears them ever more slowly."""
 
+HARDEST = 3.0
+"""Accelerations of vehicles that move by themselves count up to this, m/s2."""
+
 TIE = 1e-7
 """Left and right, mirrored, cost the same: the first is taken then, whichever way rounding goes."""
 
@@ -34,12 +35,7 @@ TIE = 1e-7
 @kernel
 def begin_segment(tables: Tables, state: State, c: int, request: int, leftover: float) -> None:
     """Choose group and examples for the next segment of character ``c``; ``leftover`` seconds of it have passed."""
-    group = next_group(tables, state, c, request)
-    state.group[c] = group
-    blend_nearest(tables, state, c, group)
-    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
-    state.started[c] = speed
-    state.segments[c] += 1
+    begin_group(tables, state, c, next_group(tables, state, c, request), 0.0)
     slope = 0.0
     for n in range(NEIGHBOURS):
         if state.weights[c, n] > 0.0:
@@ -50,10 +46,44 @@ def begin_segment(tables: Tables, state: State, c: int, request: int, leftover: 
 
 
 @kernel
+def begin_group(tables: Tables, state: State, c: int, group: int, generic: float) -> None:
+    """Begin a segment of a group at a generic time, with the examples nearest to what the character does."""
+    state.group[c] = group
+    describe_vehicle(tables, state, c)
+    blend_nearest(tables, state, c, group)
+    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    state.started[c] = speed
+    state.segments[c] += 1
+    state.generic[c] = generic
+
+
+@kernel
+def describe_vehicle(tables: Tables, state: State, c: int) -> None:
+    """Take down what groups and examples are chosen by: speed, tangential and lateral acceleration.
+
+    A vehicle that moves by itself and goes slower than anybody was seen to walk has the examples of the slowest that
+    turn as it does, one that goes faster than everybody those of the fastest.
+    """
+    vx, vz = state.velocity[c, 0], state.velocity[c, 1]
+    ax, az = state.acceleration[c, 0], state.acceleration[c, 1]
+    sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
+    speed = math.hypot(vx, vz)
+    state.choice[c, 0] = speed
+    state.choice[c, 1] = ax * sine + az * cosine
+    state.choice[c, 2] = ax * cosine - az * sine
+    if state.given[c]:
+        speed = min(max(speed, tables.slowest), tables.fastest)
+        state.choice[c, 0] = speed
+        state.choice[c, 1] = min(max(state.choice[c, 1], -HARDEST), HARDEST)
+        state.choice[c, 2] = min(max(speed * state.turning[c], -HARDEST), HARDEST)
+
+
+@kernel
 def next_group(tables: Tables, state: State, c: int, request: int) -> int:
     """The group on the shortest way to the motion asked for that the present speed allows."""
     g = state.group[c]
-    speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
+    describe_vehicle(tables, state, c)
+    speed = state.choice[c, 0]
     if state.fresh[c]:
         return first_group(tables, state, c, request)
     best, best_cost = -1, 1e18
@@ -74,7 +104,9 @@ def next_group(tables: Tables, state: State, c: int, request: int) -> int:
         off = misfit(tables, h, speed)
         if off > 0.0:
             cost += 1e6 + 1e4 * off
-        cost += min(nearest(tables, state, c, h), 50.0) / 50.0
+        if cost >= best_cost - TIE:  # too dear already
+            continue
+        cost += nearest(tables, state, c, h, 50.0) / 50.0
         if cost < best_cost - TIE:
             best, best_cost = h, cost
     if best < 0 or (best_cost > 5e8 and tables.steps[g, request] >= UNREACHABLE):
@@ -106,7 +138,7 @@ def first_group(tables: Tables, state: State, c: int, request: int) -> int:
     for h in range(len(tables.first)):
         if tables.sizes[h] == 0:
             continue
-        cost = nearest(tables, state, c, h)
+        cost = nearest(tables, state, c, h, 1e18)
         if tables.comes_from[h] != request or tables.leads_to[h] != request:
             cost += 1e9
         if cost < best_cost - TIE:
@@ -115,30 +147,43 @@ def first_group(tables: Tables, state: State, c: int, request: int) -> int:
 
 
 @kernel
-def distance(tables: Tables, state: State, c: int, e: int) -> float:
-    """Squared distance of an example's beginning from what the character does: vehicle and pose."""
-    vx, vz = state.velocity[c, 0], state.velocity[c, 1]
-    ax, az = state.acceleration[c, 0], state.acceleration[c, 1]
-    sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
-    more = ax * sine + az * cosine - tables.parameters[e, 1]
-    a = (math.hypot(vx, vz) - tables.parameters[e, 0] + AHEAD * more) / SPEED_SCALE
+def distance(tables: Tables, state: State, c: int, e: int, most: float) -> float:
+    """Squared distance of an example's beginning from what the character does: vehicle and pose.
+
+    What is ``most`` or more is not worked out to the end.
+    """
+    more = state.choice[c, 1] - tables.parameters[e, 1]
+    a = (state.choice[c, 0] - tables.parameters[e, 0] + AHEAD * more) / SPEED_SCALE
     b = more / TANGENTIAL_SCALE
-    d = (ax * cosine - az * sine - tables.parameters[e, 2]) / LATERAL_SCALE
+    d = (state.choice[c, 2] - tables.parameters[e, 2]) / LATERAL_SCALE
     total = a * a + b * b + d * d
-    pose = 0.0
-    for k in range(tables.features.shape[2]):
-        gap = tables.features[e, MARGIN, k] - state.features[c, k]
-        pose += tables.feature_weights[k] * gap * gap
-    return total + 3.0 * pose / (POSE_SCALE * POSE_SCALE)
+    if total >= most:
+        return total
+    return total + 3.0 * unlike(tables.beginnings[e], state.features[c], tables.feature_weights) / POSE_SCALE**2
 
 
 @kernel
-def nearest(tables: Tables, state: State, c: int, h: int) -> float:
-    """Smallest distance to any example of a group."""
-    best = 1e18
+def unlike(a, b, weights):  # type: ignore[no-untyped-def]
+    """Weighted sum of squared differences; four sums at a time, which a processor can add side by side."""
+    s0, s1, s2, s3 = 0.0, 0.0, 0.0, 0.0
+    whole = len(a) // 4 * 4
+    for k in range(0, whole, 4):
+        s0 += weights[k] * (a[k] - b[k]) ** 2
+        s1 += weights[k + 1] * (a[k + 1] - b[k + 1]) ** 2
+        s2 += weights[k + 2] * (a[k + 2] - b[k + 2]) ** 2
+        s3 += weights[k + 3] * (a[k + 3] - b[k + 3]) ** 2
+    for k in range(whole, len(a)):
+        s0 += weights[k] * (a[k] - b[k]) ** 2
+    return (s0 + s1) + (s2 + s3)
+
+
+@kernel
+def nearest(tables: Tables, state: State, c: int, h: int, most: float) -> float:
+    """Smallest distance to any example of a group, at most ``most``."""
+    best = most
     for e in range(tables.first[h], tables.first[h] + tables.sizes[h]):
         if tables.allowed[e]:
-            best = min(best, distance(tables, state, c, e))
+            best = min(best, distance(tables, state, c, e, best))
     return best
 
 
@@ -148,12 +193,12 @@ def blend_nearest(tables: Tables, state: State, c: int, h: int) -> None:
 
     So weights fall to nothing where a neighbour drops out of the blend, and an exact hit takes all the weight.
     """
-    found = np.full(NEIGHBOURS + 1, 1e18)
-    which = np.zeros(NEIGHBOURS + 1, np.int64)
+    found, which = state.found[c], state.found_examples[c]
+    found[:], which[:] = 1e18, 0
     for e in range(tables.first[h], tables.first[h] + tables.sizes[h]):
         if not tables.allowed[e]:
             continue
-        d = distance(tables, state, c, e) + 1e-9
+        d = distance(tables, state, c, e, found[NEIGHBOURS]) + 1e-9
         if d >= found[NEIGHBOURS]:
             continue
         k = NEIGHBOURS

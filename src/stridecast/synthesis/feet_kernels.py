@@ -60,6 +60,9 @@ NEARLY_STRAIGHT = 0.972
 GIVE_UP = 0.05
 """A planted foot that would pull the pelvis down by more than this is let go early, metres."""
 
+APART, ABREAST = 0.07, 0.5
+"""Led feet keep their toes so far apart sideways, the less the further one is ahead, up to the second; metres."""
+
 TIP = 0.004
 """The tips of the toes stay above this height, metres."""
 
@@ -71,6 +74,7 @@ def plant_feet(tables: Tables, state: State, c: int, dt: float) -> None:
     for side in range(2):
         planted = is_planted(tables, state, c, side)
         hip, toe, turned, toes = meant_foot(tables, state, c, side)
+        toe = (toe[0], toe[1] + state.lift[c, side], toe[2])
         if not planted:
             state.given_up[c, side] = False
         hold_or_release(tables, state, c, side, planted and not state.given_up[c, side], toe, turned, toes, dt)
@@ -192,6 +196,7 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
             rate = (toe[k] - state.toe_meant[c, side, k]) / dt
             state.slip_rate[c, side, k] = state.toe_rate[c, side, k] - rate
 
+    lead_x, lead_z = 0.0, 0.0
     if state.locked[c, side]:
         half_life = CATCH_HALF_LIFE
         tip = rotate(foot_turn(state, c, side, toes), toe_tip(tables, side))
@@ -208,17 +213,49 @@ def hold_or_release(tables, state, c, side, planted, toe, turned, toes, dt):  # 
     else:
         half_life = RELEASE_HALF_LIFE
         meant = toe
-        state.twist[c, side], state.twist_rate[c, side] = decay(
-            state.twist[c, side], state.twist_rate[c, side], RELEASE_HALF_LIFE, dt
+        turn = state.lead[c, side, 2]
+        twist, state.twist_rate[c, side] = decay(
+            state.twist[c, side] - turn, state.twist_rate[c, side], RELEASE_HALF_LIFE, dt
         )
+        state.twist[c, side] = twist + turn
+        lead_x, lead_z = led(state, c, side, toe)
+        if state.given[c]:
+            push = apart(state, c, side, toe[0] + lead_x, toe[2] + lead_z)
+            lead_x += push * math.cos(state.heading[c])
+            lead_z -= push * math.sin(state.heading[c])
     for k in range(3):
-        slip, rate = decay(state.slip[c, side, k], state.slip_rate[c, side, k], half_life, dt)
+        aim = lead_x if k == 0 else (lead_z if k == 2 else 0.0)
+        slip, rate = decay(state.slip[c, side, k] - aim, state.slip_rate[c, side, k], half_life, dt)
+        slip += aim
         state.slip[c, side, k], state.slip_rate[c, side, k] = slip, rate
         state.toe[c, side, k] = meant[k] + slip
     state.toe[c, side, 1] = max(state.toe[c, side, 1], tables.sole)
     for k in range(3):
         state.toe_rate[c, side, k] = 0.0 if state.fresh[c] else (state.toe[c, side, k] - shown[k]) / dt
         state.toe_meant[c, side, k] = toe[k]
+
+
+@kernel
+def led(state, c, side, toe):  # type: ignore[no-untyped-def]
+    """By how much a free foot is led away from its place in the pose: turned about the vehicle, and moved."""
+    turn = state.lead[c, side, 2]
+    x, z = toe[0] - state.position[c, 0], toe[2] - state.position[c, 1]
+    sine, cosine = math.sin(turn), math.cos(turn)
+    return (
+        state.lead[c, side, 0] + x * (cosine - 1.0) + z * sine,
+        state.lead[c, side, 1] + z * (cosine - 1.0) - x * sine,
+    )
+
+
+@kernel
+def apart(state, c, side, x, z):  # type: ignore[no-untyped-def]
+    """By how much a free foot that passes the other one is moved to the left so that the legs do not touch."""
+    sine, cosine = math.sin(state.heading[c]), math.cos(state.heading[c])
+    dx, dz = x - state.toe[c, 1 - side, 0], z - state.toe[c, 1 - side, 2]
+    ahead, left = dx * sine + dz * cosine, dx * cosine - dz * sine
+    outwards = 1.0 if side == 0 else -1.0
+    near = 1.0 - (ahead / ABREAST) ** 2
+    return outwards * min(max(near * (APART - outwards * left), 0.0), APART) if near > 0.0 else 0.0
 
 
 @kernel

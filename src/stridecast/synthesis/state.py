@@ -24,6 +24,7 @@ class State(NamedTuple):
     acceleration: Array  # C 2
     heading: Array  # C
     side: Array  # C, to which side a reversal is under way
+    elapsed: Array  # C, seconds the last step took
     # wish
     seen: Array  # C 2, the point of the last frame
     seen_velocity: Array  # C 2, how it moves, smoothed
@@ -39,6 +40,17 @@ class State(NamedTuple):
     made_up: Array  # C, transitions that had no example
     # size of movement
     size: Array  # C 3: share of what exaggerated movements add, how fast it changes, the share wanted
+    # choice of examples
+    choice: Array  # C 3, speed, tangential and lateral acceleration that they are chosen by
+    # a vehicle that moves by itself
+    given: Array  # C, whether it does
+    turning: Array  # C, how fast it turns, smoothed
+    phase: Array  # C, phase of the gait in which somebody appears, 0 to 1
+    scale: Array  # C, how large movements are against the examples
+    scale_rate: Array  # C
+    lead: Array  # C 2 3, where a foot comes down against the examples: x, z, turn
+    lift: Array  # C 2, how much higher it swings
+    astray: Array  # C, how far the feet are from where they belong under a standing body
     # seams
     features: Array  # C D, of the last frame as shown; at first the pose to begin with
     before: Array  # C D, of the frame before
@@ -64,6 +76,11 @@ class State(NamedTuple):
     bounds: Array  # C 7: jerk, least and greatest tangential, greatest lateral, least and greatest speed; in force
     acted: Array  # C, bits of the bounds that acted
     fresh: Array  # C, nothing shown yet
+    # room to work in, as kernels make no arrays
+    meant: Array  # C D, blended features
+    ahead: Array  # C D, those of the next frame
+    found: Array  # C NEIGHBOURS+1, distances of the nearest examples
+    found_examples: Array  # C NEIGHBOURS+1
 
 
 def make_state(count: int, tables: Tables) -> State:
@@ -76,6 +93,7 @@ def make_state(count: int, tables: Tables) -> State:
         "acceleration": (2,),
         "heading": (),
         "side": (),
+        "elapsed": (),
         "seen": (2,),
         "seen_velocity": (2,),
         "anchor": (2,),
@@ -83,6 +101,14 @@ def make_state(count: int, tables: Tables) -> State:
         "generic": (),
         "started": (),
         "size": (3,),
+        "choice": (3,),
+        "turning": (),
+        "phase": (),
+        "scale": (),
+        "scale_rate": (),
+        "lead": (2, 3),
+        "lift": (2,),
+        "astray": (),
         "features": (width,),
         "before": (width,),
         "seam": (width,),
@@ -101,14 +127,19 @@ def make_state(count: int, tables: Tables) -> State:
         "root": (3,),
         "rotations": (joints, 4),
         "bounds": (6,),
+        "meant": (width,),
+        "ahead": (width,),
+        "found": (NEIGHBOURS + 1,),
     }
     whole = {"group": (), "chosen": (NEIGHBOURS,), "segments": (), "made_up": (), "acted": ()}
-    flags = {"arriving": (), "locked": (2,), "given_up": (2,), "fresh": ()}
+    whole["found_examples"] = (NEIGHBOURS + 1,)
+    flags = {"arriving": (), "locked": (2,), "given_up": (2,), "fresh": (), "given": ()}
     arrays = {name: np.zeros((count, *shape)) for name, shape in shapes.items()}
     arrays |= {name: np.zeros((count, *shape), np.int64) for name, shape in whole.items()}
     arrays |= {name: np.zeros((count, *shape), bool) for name, shape in flags.items()}
     arrays["fresh"][:] = True
     arrays["features"][:] = tables.neutral
+    arrays["scale"][:] = 1.0
     return State(**arrays)
 
 

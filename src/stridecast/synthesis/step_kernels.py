@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,14 +19,13 @@ from stridecast.synthesis.blend_kernels import (
 )
 from stridecast.synthesis.choice_kernels import begin_segment
 from stridecast.synthesis.feet_kernels import plant_feet
+from stridecast.synthesis.given_kernels import STAND, aim_feet, next_segment_of_given, take_over, watch_feet
 from stridecast.synthesis.pose_kernels import compose
 from stridecast.synthesis.state import State
 from stridecast.synthesis.tables import Tables
 
-STAND, WALK, RUN = 0, 1, 2
-
-POINT, FORCE, PLAN = 0, 1, 2
-"""Kinds of wishes: a point to follow, a force, the acceleration of somebody who has planned the way."""
+POINT, FORCE, PLAN, GIVEN = 0, 1, 2, 3
+"""Kinds of wishes: a point to follow, a force, the acceleration of somebody who has planned the way, a vehicle."""
 SEEN_HALF_LIFE = 0.07
 """How the point moves is smoothed with this half-life, seconds."""
 
@@ -57,6 +57,15 @@ WISH_TO_STOP = 0.55
 """A wished speed below this beside a point at rest is an arrival, m/s."""
 
 
+class Given(NamedTuple):
+    """Vehicles that move by themselves."""
+
+    position: np.ndarray  # C 2
+    velocity: np.ndarray  # C 2
+    acceleration: np.ndarray  # C 2
+    heading: np.ndarray  # C
+
+
 @kernel
 def step_block(
     tables: Tables,
@@ -66,19 +75,30 @@ def step_block(
     kind: np.ndarray,
     rests_in: np.ndarray,
     motions: np.ndarray,
+    given: Given,
+    active: np.ndarray,
     alpha: float,
     beta: float,
-    dt: float,
+    steps: np.ndarray,
     first: int,
     last: int,
 ) -> None:
-    """Advance characters ``first`` to ``last`` by one frame."""
-    meant = np.empty(tables.features.shape[2])
+    """Advance those of characters ``first`` to ``last`` who are active by one frame, of ``steps`` seconds each."""
     for c in range(first, last):
-        watch_point(state, points, kind, c, dt)
-        request = motion_wanted(tables, state, points, forces, kind, motions[c], alpha, beta, c)
-        begun = next_segment_if_due(tables, state, c, request, rests_in[c], dt)
-        move_vehicle(tables, state, points, forces, kind, rests_in[c], request, alpha, beta, c, dt)
+        if not active[c]:
+            continue
+        dt, meant = steps[c], state.meant[c]
+        state.given[c] = kind[c] == GIVEN
+        if state.given[c]:
+            take_over(state, given, c, dt)
+            begun = next_segment_of_given(tables, state, c, motions[c], dt)
+            aim_feet(tables, state, c, rests_in[c])
+        else:
+            state.scale[c], state.lead[c], state.lift[c] = 1.0, 0.0, 0.0
+            watch_point(state, points, kind, c, dt)
+            request = motion_wanted(tables, state, points, forces, kind, motions[c], alpha, beta, c)
+            begun = next_segment_if_due(tables, state, c, request, rests_in[c], dt)
+            move_vehicle(tables, state, points, forces, kind, rests_in[c], request, alpha, beta, c, dt)
         if state.size[c, 0] != state.size[c, 2]:
             change_size(state.size[c], state.fresh[c], dt)
         blended(tables, state, c, state.generic[c], meant)
@@ -88,6 +108,9 @@ def step_block(
         compose(tables, state, c)
         plant_feet(tables, state, c, dt)
         close_seam(state, c, dt)
+        if state.given[c]:
+            watch_feet(tables, state, c)
+        state.elapsed[c] = dt
         state.fresh[c] = False
 
 

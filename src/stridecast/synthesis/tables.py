@@ -15,7 +15,7 @@ from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import SIDES
 from stridecast.model.database import MARGIN, MotionDatabase
 from stridecast.model.group import MotionGroup
-from stridecast.model.segment import MOTIONS, RUN, STAND
+from stridecast.model.segment import MOTIONS, RUN, STAND, WALK
 from stridecast.model.skeleton import Skeleton
 
 Array = np.ndarray
@@ -32,6 +32,7 @@ class Tables(NamedTuple):
 
     # examples
     features: Array  # E R D
+    beginnings: Array  # E D, features of the first frames, side by side for the choice
     larger: Array  # E R D, what exaggerated movements add, single precision; none while nobody asks for another size
     times: Array  # E R
     parameters: Array  # E 3, speed at the first frame, mean tangential and lateral acceleration
@@ -57,6 +58,19 @@ class Tables(NamedTuple):
     speed: Array  # G 2 2
     rising: Array  # G, how fast the greatest speed goes on rising after the last frame
     approach: Array  # G 3 2, speeds at which what follows a group on the way to a motion can begin
+    # vehicles that move by themselves
+    speeds: Array  # E R
+    turning: Array  # E, how fast its vehicle turns on average, rad/s
+    standing: int  # a group that only stands, -1 if there is none
+    halves: Array  # 3 2, group of each motion's half cycles on the left foot and on the right; -1 if there is none
+    step_off: Array  # 2, group in which the left (right) foot leaves a double support; -1 if there is none
+    step_off_at: Array  # 2, generic time just before it leaves
+    swings: Array  # G, share of the segment in which a foot is in the air
+    slowest: float  # speed of the slowest walking (or running) that examples begin with
+    fastest: float
+    run_from: float  # slowest running, m/s
+    walk_to: float  # fastest walking
+    home: Array  # 2 2, toe joints under a standing body, left and ahead of the vehicle
     # pose
     neutral: Array  # D, how people stand who are about to go or have just come
     references: Array  # J-1 4
@@ -90,8 +104,11 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
     labels = sorted({g.motion for g in groups})
     skeleton = database.skeleton
     entry = np.array([_entry_speed(g, examples.parameters[g.rows][allowed[g.rows], 0]) for g in groups])
+    neutral = _neutral(database, allowed)
+    step_off, step_off_at = _step_off(groups, usable)
     return Tables(
         features=examples.features,
+        beginnings=np.ascontiguousarray(examples.features[:, MARGIN]),
         larger=np.zeros((0, *examples.features.shape[1:]), np.float32),
         times=examples.times,
         parameters=_parameters(database),
@@ -116,7 +133,27 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         speed=np.array([g.bounds.speed for g in groups]),
         rising=np.array([_rising(g) for g in groups]),
         approach=_approach(groups, entry, graph),
-        neutral=_neutral(database, allowed),
+        speeds=np.ascontiguousarray(examples.travelled[:, :, 3]),
+        turning=(examples.travelled[:, -1 - MARGIN, 2] - examples.travelled[:, MARGIN, 2]) / examples.durations,
+        standing=next((i for i, g in enumerate(groups) if usable[i] and g.motion == STAND), -1),
+        halves=_halves(groups, usable),
+        step_off=step_off,
+        step_off_at=step_off_at,
+        swings=np.array([_swings(g) for g in groups]),
+        slowest=float(
+            min((e[0] for e, g, u in zip(entry, groups, usable, strict=True) if u and _goes(g)), default=0.0)
+        ),
+        fastest=float(
+            max((e[1] for e, g, u in zip(entry, groups, usable, strict=True) if u and _goes(g)), default=np.inf)
+        ),
+        run_from=min(
+            (e[0] for e, g, u in zip(entry, groups, usable, strict=True) if u and g.motion == RUN), default=2.0
+        ),
+        walk_to=max(
+            (e[1] for e, g, u in zip(entry, groups, usable, strict=True) if u and g.motion == WALK), default=2.0
+        ),
+        home=_home(database, neutral),
+        neutral=neutral,
         references=database.references,
         feature_weights=_feature_weights(skeleton),
         parents=np.array(skeleton.parents),
@@ -215,6 +252,50 @@ def _neutral(database: MotionDatabase, allowed: Array) -> Array:
             found.append(own[:, -1 - MARGIN])
     found = [f for f in found if len(f)] or [features[allowed][:, MARGIN]]
     return np.concatenate(found).mean(axis=0)
+
+
+def _goes(group: MotionGroup) -> bool:
+    return group.motion in (WALK, RUN)
+
+
+def _halves(groups: tuple[MotionGroup, ...], usable: Bool[Array, "groups"]) -> Array:
+    """The largest group of each motion's half cycles whose first foot on the floor is the left (the right) one."""
+    out = np.full((len(MOTIONS), 2), -1)
+    for i in np.argsort([-g.count for g in groups], kind="stable"):
+        feet = [state for state in groups[i].string if state in "LR"]
+        if usable[i] and _goes(groups[i]) and feet:
+            motion, side = MOTIONS.index(groups[i].motion), "LR".index(feet[0])
+            out[motion, side] = i if out[motion, side] < 0 else out[motion, side]
+    return out
+
+
+def _step_off(groups: tuple[MotionGroup, ...], usable: Bool[Array, "groups"]) -> tuple[Array, Array]:
+    """Groups of walking that end with a foot leaving a double support, and a time shortly before it leaves."""
+    chosen, times = np.full(2, -1), np.zeros(2)
+    for i in np.argsort([-g.count for g in groups], kind="stable"):
+        ends = groups[i].string[-2:]
+        if usable[i] and groups[i].motion == WALK and ends in ("DL", "DR"):
+            leaves = 1 if ends == "DL" else 0
+            keys = (0.0, *groups[i].keys)
+            if chosen[leaves] < 0:
+                chosen[leaves], times[leaves] = i, 0.25 * keys[-2] + 0.75 * keys[-1]
+    return chosen, times
+
+
+def _swings(group: MotionGroup) -> float:
+    """Share of a segment's generic time in which not both feet stand."""
+    lengths = np.diff((0.0, *group.keys, 1.0))
+    return float(sum(length for length, state in zip(lengths, group.string, strict=True) if state not in "DS"))
+
+
+def _home(database: MotionDatabase, neutral: Array) -> Array:
+    """Where the toes are under somebody who stands neutrally: left and ahead of the vehicle."""
+    skeleton = database.skeleton
+    tilt = 3 * (skeleton.joints - 1)
+    root = quat.multiply(quat.about_y(neutral[tilt + 6]), quat.exp(neutral[tilt : tilt + 3]))
+    joints = quat.multiply(database.references, quat.exp(neutral[:tilt].reshape(-1, 3)))
+    world = kinematics.forward(skeleton, neutral[tilt + 3 : tilt + 6], np.concatenate((root[None], joints)))
+    return world.positions[[skeleton.joint(f"{side}_toe") for side in SIDES]][:, [0, 2]]
 
 
 def _feature_weights(skeleton: Skeleton) -> Array:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from stridecast.errors import InputError, WishError
 from stridecast.geometry.kernels import is_compiled
@@ -19,7 +19,7 @@ from stridecast.steering.force import SteeringGains
 from stridecast.steering.kernels import JERK, LATERAL, SPEED, TANGENTIAL
 from stridecast.synthesis.sizes import AMOUNTS, enlargement
 from stridecast.synthesis.state import make_state
-from stridecast.synthesis.step_kernels import FORCE, PLAN, POINT, step_block
+from stridecast.synthesis.step_kernels import FORCE, GIVEN, PLAN, POINT, Given, step_block
 from stridecast.synthesis.tables import make_tables
 
 Array = np.ndarray
@@ -36,6 +36,9 @@ _NAMES = tuple(
 
 BLOCK = 64
 """Characters a thread steps at a time."""
+
+LONGEST_STEP = 0.2
+"""Nobody is stepped by more than this at a time, seconds."""
 
 FARTHEST = 1e6
 """A point further from the origin than this is a mistake, metres."""
@@ -105,6 +108,8 @@ class Walkers:
             )
         }
         self._state = make_state(len(places), self._tables)
+        self._blank = make_state(1, self._tables)
+        self._made_up_before = 0
         self._state.position[:] = places
         self._state.heading[:] = looks
         self._points = places.copy()
@@ -112,6 +117,10 @@ class Walkers:
         self._kind = np.full(len(places), POINT)
         self._rests_in = np.full(len(places), np.inf)
         self._wanted = np.zeros(len(places), np.int64)
+        s = self._state
+        self._given = Given(s.position.copy(), s.velocity.copy(), s.acceleration.copy(), s.heading.copy())
+        self._active = np.ones(len(places), bool)
+        self._steps = np.full(len(places), 1.0 / rate)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self._set_sizes(self._sizes_of(size))
 
@@ -126,7 +135,71 @@ class Walkers:
     @property
     def made_up(self) -> int:
         """Transitions so far for which the database had no example, so that poses were blended over instead."""
-        return int(self._state.made_up.sum())
+        return self._made_up_before + int(self._state.made_up.sum())
+
+    def place(
+        self,
+        rows: Sequence[int] | Int[Array, "rows"],
+        positions: Float[Array, "rows 2"],
+        headings: Float[Array, "rows"] | float = 0.0,
+        *,
+        phase: Float[Array, "rows"] | float = 0.0,
+        size: str | Sequence[str] = "neutral",
+    ) -> None:
+        """Put new people into rows; nothing is left there of who was in them before.
+
+        Whoever is then stepped with a vehicle in motion walks or runs in the first frame.
+
+        Parameters
+        ----------
+        rows
+            Which rows, each once.
+        positions, headings
+            Where they are and look, metres and radians.
+        phase
+            Where in their gait those are who appear in motion, from 0 to below 1: the half cycle of the left foot
+            begins at 0, that of the right foot at 0.5.
+        size
+            Size of movement (see ``step``).
+
+        Raises
+        ------
+        InputError
+            Rows that are not there or come twice, places that are no finite numbers, a phase outside 0 to 1.
+        WishError
+            An unknown size. Nothing has changed then.
+        """
+        which = np.asarray(rows)
+        if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
+            raise InputError("rows must be a list of whole numbers")
+        which = which.astype(np.int64)
+        outside = which[(which < 0) | (which >= len(self))]
+        if len(outside):
+            raise InputError(f"there is no row {outside[0]}; rows are 0 to {len(self) - 1}")
+        if len(np.unique(which)) != len(which):
+            raise InputError("a row can be filled once at a time; one comes twice")
+        places = np.asarray(positions, np.float64)
+        if places.shape != (len(which), 2):
+            raise InputError(f"positions must have shape {(len(which), 2)}, not {places.shape}")
+        looks, phases = np.asarray(headings, np.float64), np.asarray(phase, np.float64)
+        for name, values in (("headings", looks), ("phase", phases)):
+            if values.shape not in ((), (len(which),)):
+                raise InputError(f"{name} must be one number or one for each of {len(which)} rows")
+        if not (np.isfinite(places).all() and np.isfinite(looks).all()):
+            raise InputError("positions and headings must be finite numbers")
+        if not ((phases >= 0.0) & (phases < 1.0)).all():
+            raise InputError("a phase lies between 0 and 1, without 1")
+        sizes = self._sizes_of(size, len(which))
+        self._enlarge_if(sizes)
+        self._made_up_before += int(self._state.made_up[which].sum())
+        for field, blank in zip(self._state, self._blank, strict=True):
+            field[which] = blank[0]
+        self._state.position[which] = places
+        self._state.heading[which] = looks
+        self._state.phase[which] = phases
+        self._state.size[which, 2] = sizes
+        self._points[which] = places
+        self._forces[which] = 0.0
 
     def step(
         self,
@@ -135,10 +208,13 @@ class Walkers:
         forces: Float[Array, "characters 2"] | None = None,
         accelerations: Float[Array, "characters 2"] | None = None,
         rests_in: Float[Array, "characters"] | float = np.inf,
-        motion: str | Sequence[str] = "walk",
+        motion: str | Sequence[str] | Int[Array, "characters"] = "walk",
         size: str | Sequence[str] | None = None,
+        vehicles: VehicleState | None = None,
+        active: Bool[Array, "characters"] | None = None,
+        dt: Float[Array, "characters"] | float | None = None,
     ) -> Pose:
-        """Advance by one frame. Give one of points, forces and accelerations.
+        """Advance by one frame. Give one of points, forces, accelerations and vehicles.
 
         Parameters
         ----------
@@ -149,22 +225,34 @@ class Walkers:
         accelerations
             Instead of points: what a plan wants, in the world, m/s2 (see ``paths.follow``).
         rests_in
-            With accelerations: time until the plan comes to rest, seconds; stops begin and play so that they end then.
+            With accelerations or vehicles: time until the plan comes to rest, seconds; stops begin and play so that
+            they end then. Infinite for those who are not about to rest.
         motion
-            ``stand``, ``walk`` or ``run``, one for all or one each; carried out at the next segment the graph allows.
+            ``stand``, ``walk`` or ``run``, one for all or one each, or an array of their numbers in ``MOTIONS``;
+            carried out at the next segment the graph allows.
             Beside a point that rests, a character comes to stand by itself.
         size
             How large movements are: ``calm``, ``neutral``, ``lively`` or ``exaggerated``, one for all or one each; as
             before if left out. It changes smoothly, in about half a second.
+        vehicles
+            Instead of points: vehicles that move by themselves, a row each, at any speed, also turning on the spot.
+            They are shown as given, and the bodies follow: smaller and slower steps below the slowest walk of the
+            database, feet put beside each other where the vehicle rests, running only where it is fast enough.
+        active
+            Who is stepped; everybody if left out. The others stay as they are, and what is given for them does not
+            matter.
+        dt
+            Seconds that pass in this step, one for all or one each, up to ``LONGEST_STEP``; 1 / frame_rate if left
+            out. Who is far away can be stepped every third frame with thrice the time.
 
         Raises
         ------
         WishError
-            Not exactly one of points, forces and accelerations, wrong shape, numbers that are not finite, an unknown
-            motion or size. Nothing has changed then.
+            Not exactly one of points, forces, accelerations and vehicles, wrong shape, numbers that are not finite, an
+            unknown motion or size. Nothing has changed then.
         """
         sizes = None if size is None else self._sizes_of(size)
-        self._take_wish(points, forces, accelerations, rests_in, motion)
+        self._take_wish(points, forces, accelerations, vehicles, rests_in, motion, active, dt)
         if sizes is not None:
             self._set_sizes(sizes)
         self._advance()
@@ -175,8 +263,11 @@ class Walkers:
         points: Array | None,
         forces: Array | None,
         accelerations: Array | None,
+        vehicles: VehicleState | None,
         rests_in: Array | float,
-        motion: str | Sequence[str],
+        motion: str | Sequence[str] | Array,
+        active: Array | None,
+        dt: Array | float | None,
     ) -> None:
         """Check a wish whole before any of it is stored."""
         given = [
@@ -185,38 +276,110 @@ class Walkers:
                 (POINT, "points", points),
                 (FORCE, "forces", forces),
                 (PLAN, "accelerations", accelerations),
+                (GIVEN, "vehicles", vehicles),
             )
             if wish is not None
         ]
         if len(given) != 1:
-            raise WishError("give one of points, forces and accelerations")
-        kind, name, wish = given[0]
-        wish = np.asarray(wish, np.float64)
-        if wish.shape != self._points.shape:
-            raise WishError(f"{name} must have shape {self._points.shape}, not {wish.shape}")
-        if not np.isfinite(wish).all():
-            row = int(np.flatnonzero(~np.isfinite(wish).all(axis=1))[0])
-            raise WishError(f"the wish of character {row} is {wish[row].tolist()}: finite numbers are wanted")
-        if np.abs(wish).max() > FARTHEST:
-            raise WishError(f"the wish lies further than {FARTHEST:.0e} from the origin")
-        rests = np.asarray(rests_in, np.float64)
-        if rests.shape not in ((), (len(self),)) or np.isnan(rests).any() or (rests < 0).any():
-            raise WishError("rests_in must be seconds from 0, one for all or one each")
-        if isinstance(motion, str):
-            wanted: int | list[int] = self._number_of(motion)
+            raise WishError("give one of points, forces and accelerations, or vehicles")
+        kind, name, given_wish = given[0]
+        stepped = self._who(active)
+        moved, wish = self._given, self._points
+        if vehicles is not None:
+            moved = self._vehicles(vehicles, stepped)
         else:
-            if len(motion) != len(self):
-                raise WishError(f"{len(motion)} motions for {len(self)} characters")
-            wanted = [self._number_of(name) for name in motion]
-        self._wanted[:] = wanted
-        self._kind[:] = kind
-        self._rests_in[:] = rests if kind == PLAN else np.inf
-        (self._points if kind == POINT else self._forces)[:] = wish
+            wish = self._numbers(name, given_wish, self._points.shape, stepped)
+            if np.abs(wish[stepped]).max(initial=0.0) > FARTHEST:
+                raise WishError(f"the wish lies further than {FARTHEST:.0e} from the origin")
+        rests = np.asarray(rests_in, np.float64)
+        if rests.shape not in ((), (len(self),)):
+            raise WishError("rests_in must be seconds from 0, one for all or one each")
+        rests = np.broadcast_to(rests, (len(self),))
+        if not (rests[stepped] >= 0).all():
+            raise WishError("rests_in must be seconds from 0, one for all or one each")
+        wanted = self._numbers_of(motion, stepped)
+        steps = self._steps_of(dt, stepped)
+        self._active[:] = stepped
+        self._steps[:] = steps
+        self._given = moved
+        self._wanted[stepped] = wanted[stepped]
+        self._kind[stepped] = kind
+        self._rests_in[stepped] = rests[stepped] if kind in (PLAN, GIVEN) else np.inf
+        if kind != GIVEN:
+            (self._points if kind == POINT else self._forces)[stepped] = wish[stepped]
 
-    def _sizes_of(self, size: str | Sequence[str]) -> list[float]:
-        names = [size] * len(self) if isinstance(size, str) else list(size)
-        if len(names) != len(self):
-            raise WishError(f"{len(names)} sizes for {len(self)} characters")
+    def _who(self, active: Array | None) -> Array:
+        if active is None:
+            return np.ones(len(self), bool)
+        stepped = np.asarray(active)
+        if stepped.shape != (len(self),) or stepped.dtype != bool:
+            raise WishError(f"active must be {len(self)} truth values, not {stepped.dtype} of shape {stepped.shape}")
+        return stepped
+
+    def _numbers(self, name: str, wish: object, shape: tuple[int, ...], stepped: Array) -> Array:
+        """Numbers of a wish as an array of a shape, finite for those who are stepped."""
+        try:
+            numbers = np.ascontiguousarray(wish, np.float64)
+            if not numbers.flags.writeable:  # to compiled code a type of its own
+                numbers = numbers.copy()
+        except (TypeError, ValueError):
+            raise WishError(f"{name} must be numbers of shape {shape}") from None
+        if numbers.shape != shape:
+            raise WishError(f"{name} must have shape {shape}, not {numbers.shape}")
+        fine = np.isfinite(numbers).reshape(len(self), -1).all(axis=1) | ~stepped
+        if not fine.all():
+            row = int(np.flatnonzero(~fine)[0])
+            raise WishError(f"the wish of character {row} is {numbers[row].tolist()}: finite numbers are wanted")
+        return numbers
+
+    def _vehicles(self, vehicles: VehicleState, stepped: Array) -> Given:
+        given = Given(
+            *(
+                self._numbers(f"vehicles.{name}", getattr(vehicles, name), shape, stepped)
+                for name, shape in (
+                    ("position", self._points.shape),
+                    ("velocity", self._points.shape),
+                    ("acceleration", self._points.shape),
+                    ("heading", (len(self),)),
+                )
+            )
+        )
+        if np.abs(given.position[stepped]).max(initial=0.0) > FARTHEST:
+            raise WishError(f"a vehicle lies further than {FARTHEST:.0e} from the origin")
+        return given
+
+    def _numbers_of(self, motion: str | Sequence[str] | Array, stepped: Array) -> Array:
+        """Numbers of the motions asked for."""
+        if isinstance(motion, str):
+            return np.full(len(self), self._number_of(motion))
+        if len(motion) != len(self):
+            raise WishError(f"{len(motion)} motions for {len(self)} characters")
+        if isinstance(motion, np.ndarray) and motion.dtype.kind in "iu":
+            known = np.isin(motion, list(self._motions.values())) | ~stepped
+            if not known.all():
+                wrong = motion[~known][0]
+                there = ", ".join(f"{number} ({name})" for name, number in self._motions.items())
+                raise WishError(f"there is no motion {wrong}; there are {there}")
+            return motion.astype(np.int64)
+        return np.array([self._number_of(name) for name in motion])
+
+    def _steps_of(self, dt: Array | float | None, stepped: Array) -> Array:
+        """Seconds of everybody's step."""
+        if dt is None:
+            return np.full(len(self), 1.0 / self.frame_rate)
+        steps = np.asarray(dt, np.float64)
+        if steps.shape not in ((), (len(self),)):
+            raise WishError(f"dt must be seconds, one for all or one each of {len(self)}")
+        steps = np.broadcast_to(steps, (len(self),))
+        if not ((steps[stepped] > 0.0) & (steps[stepped] <= LONGEST_STEP)).all():
+            raise WishError(f"a step takes more than 0 and at most {LONGEST_STEP} seconds")
+        return steps
+
+    def _sizes_of(self, size: str | Sequence[str], count: int | None = None) -> list[float]:
+        count = len(self) if count is None else count
+        names = [size] * count if isinstance(size, str) else list(size)
+        if len(names) != count:
+            raise WishError(f"{len(names)} sizes for {count} characters")
         try:
             return [AMOUNTS[name] for name in names]
         except (KeyError, TypeError):
@@ -225,9 +388,12 @@ class Walkers:
 
     def _set_sizes(self, sizes: list[float]) -> None:
         """Take sizes over; the first that is not neutral costs a second or two."""
+        self._enlarge_if(sizes)
+        self._state.size[self._active, 2] = np.array(sizes)[self._active]
+
+    def _enlarge_if(self, sizes: list[float]) -> None:
         if any(sizes) and not len(self._tables.larger):
             self._tables = self._tables._replace(larger=enlargement(self.database).astype(np.float32))
-        self._state.size[:, 2] = sizes
 
     def _number_of(self, motion: str) -> int:
         try:
@@ -254,9 +420,11 @@ class Walkers:
             self._kind,
             self._rests_in,
             self._wanted,
+            self._given,
+            self._active,
             self.gains.alpha,
             self.gains.beta,
-            1.0 / self.frame_rate,
+            self._steps,
             first,
             last,
         )

@@ -1,0 +1,142 @@
+"""Bodies for the vehicles of a crowd: a pool of walkers that grows with it."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from stridecast.body import kinematics
+from stridecast.model.database import MotionDatabase
+from stridecast.model.pose import VehicleState
+from stridecast.model.skeleton import Skeleton
+from stridecast.synthesis.walker import Walkers
+
+Array = np.ndarray
+
+POOL = 256
+"""Bodies that are made and stepped at a time."""
+
+LEVELS = 3
+"""Who is far away is stepped at a half, or at a third of the frame rate."""
+
+
+class Bodies:
+    """Bodies in numbered rows.
+
+    Parameters
+    ----------
+    database
+        Whose motion they show.
+    frame_rate
+        Frames a second.
+    threads
+        See ``Walkers``.
+    """
+
+    def __init__(self, database: MotionDatabase, frame_rate: float, *, threads: int = 1) -> None:
+        self.database, self.frame_rate, self.threads = database, frame_rate, threads
+        self.height = stature(database.skeleton)
+        self.roots = np.zeros((0, 3))
+        self.rotations = np.zeros((0, database.skeleton.joints, 4))
+        self.planted = np.zeros((0, 2), np.bool_)
+        self.scales = np.ones(0)
+        self._pools: list[Walkers] = []
+        self._waited = np.zeros(0, np.int64)
+        self._offsets = np.zeros((0, 2))
+
+    def place(
+        self,
+        rows: Int[Array, "rows"],
+        positions: Float[Array, "rows 2"],
+        headings: Float[Array, "rows"],
+        *,
+        phases: Float[Array, "rows"],
+        heights: Float[Array, "rows"],
+        sizes: list[str],
+    ) -> None:
+        """Put new people into rows, ``heights`` in metres."""
+        while len(rows) and rows.max() >= len(self.roots):
+            self._grow()
+        self.scales[rows] = heights / self.height
+        self._waited[rows] = 0
+        for pool, inside in self._split(rows):
+            own = rows[inside] - pool * POOL
+            scaled = positions[inside] / self.scales[rows[inside], None]
+            chosen = [sizes[k] for k in np.flatnonzero(inside)]
+            self._pools[pool].place(own, scaled, headings[inside], phase=phases[inside], size=chosen)
+
+    def step(
+        self,
+        rows: Int[Array, "rows"],
+        vehicles: VehicleState,
+        motions: Int[Array, "rows"],
+        rests_in: Float[Array, "rows"],
+        levels: Int[Array, "rows"] | None = None,
+    ) -> None:
+        """Step the bodies in rows; ``vehicles`` and the rest have a row each.
+
+        ``levels`` tell of each body in how many frames it is stepped once, 1 to ``LEVELS``; in between it moves with
+        its vehicle as it is.
+        """
+        self._waited[rows] += 1
+        due = np.ones(len(rows), np.bool_) if levels is None else self._waited[rows] >= levels
+        late = rows[~due]
+        for pool, inside in self._split(rows):
+            own = rows[inside] - pool * POOL
+            count = len(self._pools[pool])
+            active = np.zeros(count, np.bool_)
+            active[own[due[inside]]] = True
+            scale = self.scales[pool * POOL : pool * POOL + count]
+
+            def spread(values: Array, own: Array = own, inside: Array = inside, count: int = count) -> Array:
+                out = np.zeros((count, *values.shape[1:]))
+                out[own] = values[inside]
+                return out
+
+            pose = self._pools[pool].step(
+                vehicles=VehicleState(
+                    position=spread(vehicles.position) / scale[:, None],
+                    velocity=spread(vehicles.velocity) / scale[:, None],
+                    acceleration=spread(vehicles.acceleration) / scale[:, None],
+                    heading=spread(np.asarray(vehicles.heading)),
+                ),
+                motion=spread(motions).astype(np.int64),
+                rests_in=spread(rests_in),
+                active=active,
+                dt=np.maximum(self._waited[pool * POOL : pool * POOL + count], 1) / self.frame_rate,
+            )
+            fresh = own[due[inside]]
+            to = fresh + pool * POOL
+            self.roots[to] = pose.root_position[fresh] * self.scales[to, None]
+            self.rotations[to] = pose.rotations[fresh]
+            self.planted[to] = pose.planted[fresh]
+        done = rows[due]
+        self._waited[done] = 0
+        self._offsets[done] = self.roots[done][:, [0, 2]] - vehicles.position[due]
+        if len(late):
+            moved = vehicles.position[~due] + self._offsets[late]
+            self.roots[late, 0], self.roots[late, 2] = moved[:, 0], moved[:, 1]
+
+    def _split(self, rows: Int[Array, "rows"]) -> list[tuple[int, Bool[Array, "rows"]]]:
+        pools = rows // POOL
+        return [(int(pool), pools == pool) for pool in np.unique(pools)]
+
+    def _grow(self) -> None:
+        self._pools.append(
+            Walkers(self.database, np.zeros((POOL, 2)), frame_rate=self.frame_rate, threads=self.threads)
+        )
+        more = POOL * len(self._pools)
+        for name in ("roots", "rotations", "planted", "scales", "_waited", "_offsets"):
+            old = getattr(self, name)
+            new = np.zeros((more, *old.shape[1:]), old.dtype)
+            new[: len(old)] = old
+            setattr(self, name, new)
+        self.scales[more - POOL :] = 1.0
+
+
+def stature(skeleton: Skeleton) -> float:
+    """Height of a skeleton that stands in its rest pose, metres."""
+    rest = kinematics.rest(skeleton).positions
+    ends = rest[skeleton.end_joints] + skeleton.end_offsets
+    heights = np.concatenate((rest[:, 1], ends[:, 1])) if len(skeleton.end_joints) else rest[:, 1]
+    return float(heights.max() - heights.min())

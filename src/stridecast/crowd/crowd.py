@@ -1,0 +1,430 @@
+"""A crowd: who comes, who goes where, how they avoid each other, and their bodies, frame by frame (BJL section 5)."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from stridecast.crowd.bodies import LEVELS, Bodies
+from stridecast.crowd.bounds import HumanBounds
+from stridecast.crowd.explanation import Explanation, explanation_of
+from stridecast.crowd.ground import ground_of
+from stridecast.crowd.population import Due, Population
+from stridecast.crowd.routes import Routes
+from stridecast.crowd.state import make_limits
+from stridecast.crowd.traffic import Newcomer, Traffic
+from stridecast.errors import InputError, PathError, SceneError
+from stridecast.model.database import MotionDatabase
+from stridecast.model.people import Mover, Person
+from stridecast.model.pose import VehicleState
+from stridecast.model.scene import Scene
+from stridecast.model.segment import MOTIONS, RUN, STAND, WALK
+from stridecast.model.skeleton import Skeleton
+
+Array = np.ndarray
+
+KEEPS = {"near": 0.1, "far": 0.35}
+"""What is kept from others beyond the bodies where there is room, by preference, metres."""
+
+BESIDE = 0.15
+"""What people who walk together leave between them, metres."""
+
+RUNS_FROM = 1.8
+"""Slower than this also a runner walks, m/s."""
+
+SIDES = {"none": 0.0, "left": 1.0, "right": -1.0}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CrowdFrame:
+    """Everybody who is there in one frame; arrays have a leading ``people`` axis.
+
+    Parameters
+    ----------
+    time
+        Seconds since the beginning.
+    ids
+        Numbers of the people, in the order in which they came, from 1.
+    positions, velocities, accelerations
+        Of the vehicles, ground points: m, m/s, m/s2.
+    headings
+        Radians.
+    radii
+        Of the bodies, metres.
+    rules
+        What each is up to (see ``crowd.rules.RULES``).
+    heights
+        Of the bodies, as a part of the database's.
+    roots, rotations, planted
+        Their poses, as of ``Pose``; nothing where the crowd has no bodies.
+    movers
+        Places of the moving obstacles.
+    """
+
+    time: float
+    ids: Int[Array, "people"]
+    positions: Float[Array, "people 2"]
+    velocities: Float[Array, "people 2"]
+    accelerations: Float[Array, "people 2"]
+    headings: Float[Array, "people"]
+    radii: Float[Array, "people"]
+    rules: Int[Array, "people"]
+    heights: Float[Array, "people"]
+    roots: Float[Array, "people 3"] | None
+    rotations: Float[Array, "people joints 4"] | None
+    planted: Bool[Array, "people 2"] | None
+    movers: Float[Array, "movers 2"]
+
+
+class Crowd:
+    """The people of a scene, stepping in real time.
+
+    Parameters
+    ----------
+    database
+        Whose bounds they keep and whose motion they show.
+    scene
+        The place, who is there and who comes.
+    agents
+        More people.
+    seed
+        Of all chance; that of the scene if left out. Same scene and seed, same bits; the order of people decides
+        nothing.
+    bodies
+        Whether they have bodies; vehicles alone are several times as fast.
+    frame_rate
+        Frames a second; the database's if left out.
+    threads
+        Threads that share the work. The result does not depend on it.
+    lod
+        Beyond the first of these distances from the ``focus`` of a step bodies are stepped in every second frame,
+        beyond the second in every third, metres. The ways of the people do not depend on it.
+    progress
+        Called with how many of the people who are there at the beginning have found their ways, and how many there are.
+
+    Raises
+    ------
+    SceneError
+        People who overlap, stand in walls or do not fit; nobody in the scene.
+    PathError
+        Somebody cannot get where they want to go; the person is named.
+    DatabaseError
+        Nobody walks in the database.
+    """
+
+    def __init__(
+        self,
+        database: MotionDatabase,
+        scene: Scene,
+        agents: Sequence[Person] = (),
+        *,
+        seed: int | None = None,
+        bodies: bool = True,
+        frame_rate: float | None = None,
+        threads: int = 1,
+        lod: tuple[float, float] | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        rate = float(database.frame_rate if frame_rate is None else frame_rate)
+        if not 10 <= rate <= 240:
+            raise InputError(f"the frame rate must lie between 10 and 240 Hz, not at {rate}")
+        if lod is not None and not 0 <= lod[0] <= lod[1]:
+            raise InputError(f"lod needs two distances from 0, the smaller first, not {lod}")
+        if agents:
+            scene = replace(scene, people=(*scene.people, *agents))
+        if scene.has_walker:
+            scene = replace(scene, people=(*scene.people, _walker_of(scene)))
+        if not (scene.people or scene.sources):
+            raise SceneError("the scene has nobody in it: a crowd needs people or sources of people")
+        self.database, self.scene, self.frame_rate, self.lod = database, scene, rate, lod
+        self.seed = scene.seed if seed is None else seed
+        self.bounds = HumanBounds.of(database)
+        self._population = Population(scene, seed=self.seed, frame_rate=rate)
+        self._coming = iter(self._population)
+        self._routes = Routes(scene, self._population.solids)
+        self._traffic = Traffic(
+            make_limits(self.bounds), ground_of(scene, self._population.solids), rate, seed=self.seed, threads=threads
+        )
+        self._bodies = Bodies(database, rate, threads=threads) if bodies else None
+        self._people: dict[int, Person] = {}  # by row
+        self._ids = np.zeros(0, np.int64)
+        self._count = 0
+        self.came: list[Person] = []
+        self.left: list[tuple[int, float]] = []
+        self._held_back: list[tuple[Due, int]] = []
+        self._next: Due | None = next(self._coming, None)
+        self._movers = [self._add_mover(mover) for mover in scene.movers]
+        self._let_in(progress)
+
+    @property
+    def time(self) -> float:
+        """Seconds since the beginning."""
+        return self._traffic.frame / self.frame_rate
+
+    @property
+    def done(self) -> bool:
+        """Whether everybody who is to come has come and left; who stays for good does not count."""
+        rows = self._rows
+        stays = self._traffic.people.stays[rows] | (self._traffic.people.points[rows] < 2)
+        return self._next is None and not self._held_back and bool(stays.all())
+
+    @property
+    def waiting(self) -> int:
+        """People who are due but cannot appear yet, as there is no room."""
+        return sum(len(due.people) for due, _ in self._held_back)
+
+    @property
+    def _rows(self) -> Int[Array, "present"]:
+        rows = self._traffic.present
+        return rows[~self._traffic.people.scripted[rows]]
+
+    def step(self, *, focus: Sequence[float] | None = None) -> CrowdFrame:
+        """Advance by one frame: who is due comes, all step, who has arrived leaves after this frame is shown.
+
+        Parameters
+        ----------
+        focus
+            Ground point from which distances for ``lod`` are measured.
+        """
+        self._leave()
+        self._let_in()
+        self._traffic.step()
+        if self._bodies is not None:
+            self._step_bodies(self._bodies, focus)
+        return self.frame()
+
+    def frame(self) -> CrowdFrame:
+        """What is to be seen now."""
+        rows, m, p, b = self._rows, self._traffic.moving, self._traffic.people, self._bodies
+        rows = rows[np.argsort(self._ids[rows])]
+        return CrowdFrame(
+            time=self.time,
+            ids=self._ids[rows],
+            positions=m.position[rows],
+            velocities=m.velocity[rows],
+            accelerations=m.acceleration[rows],
+            headings=m.heading[rows],
+            radii=p.radius[rows],
+            rules=m.rule[rows],
+            heights=np.ones(len(rows)) if b is None else b.scales[rows],
+            roots=None if b is None else b.roots[rows],
+            rotations=None if b is None else b.rotations[rows],
+            planted=None if b is None else b.planted[rows],
+            movers=m.position[self._movers] if self._movers else np.zeros((0, 2)),
+        )
+
+    def explain(self, who: int | str) -> Explanation:
+        """What somebody is up to, and why.
+
+        Parameters
+        ----------
+        who
+            Number or name.
+
+        Raises
+        ------
+        InputError
+            Nobody of that number or name is there.
+        """
+        row = self._row_of(who)
+        m = self._traffic.moving
+        other = int(m.other[row])
+        known = self._people.get(other)
+        return explanation_of(
+            self._people[row].name,
+            int(m.rule[row]),
+            None if other < 0 else known.name if known is not None else "an obstacle that moves",
+            float(m.contact[row]),
+            float(m.chosen_side[row]),
+            bool(m.held[row]),
+        )
+
+    def person(self, number: int) -> Person:
+        """Who has this number; also those who have left."""
+        if not 1 <= number <= self._count:
+            raise InputError(f"nobody has the number {number}; {self._count} have come so far")
+        return self.came[number - 1]
+
+    def skeleton(self, number: int) -> Skeleton:
+        """The skeleton of somebody, of their height."""
+        person, skeleton = self.person(number), self.database.skeleton
+        if person.height is None or self._bodies is None:
+            return skeleton
+        scale = person.height / self._bodies.height
+        return replace(skeleton, offsets=scale * skeleton.offsets, end_offsets=scale * skeleton.end_offsets)
+
+    def _row_of(self, who: int | str) -> int:
+        for row in self._rows.tolist():
+            if who in (int(self._ids[row]), self._people[row].name):
+                return row
+        raise InputError(f"nobody called {who!r} is there" if isinstance(who, str) else f"number {who} is not there")
+
+    def _leave(self) -> None:
+        rows = self._traffic.arrived()
+        for row in rows.tolist():
+            self.left.append((int(self._ids[row]), self.time))
+            del self._people[row]
+        self._traffic.remove(rows)
+
+    def _let_in(self, progress: Callable[[int, int], None] | None = None) -> None:
+        """Let in who is due and has room; the others wait outside and come as soon as there is some."""
+        now = self._traffic.frame
+        due, self._held_back = self._held_back, []
+        while self._next is not None and self._next.frame <= now:
+            due.append((self._next, 0))
+            self._next = next(self._coming, None)
+        total = sum(len(d.people) for d, _ in due)
+        done = 0
+        full: set[str | None] = set()
+        for item, attempt in due:
+            if (item.source is not None and item.source in full) or not self._enter(item, attempt):
+                full.add(item.source)
+                self._held_back.append((item, attempt + 1))
+            done += len(item.people)
+            if progress is not None:
+                progress(done, total)
+
+    def _enter(self, due: Due, attempt: int) -> bool:
+        m, p = self._traffic.moving, self._traffic.people
+        rows = self._traffic.present
+        discs = np.concatenate((m.position[rows], p.radius[rows, None]), axis=1)
+        group = self._population.place(due, discs, attempt=attempt)
+        if group is None:
+            return False
+        lead, slots = self._ways(group), _slots(group)
+        news = []
+        for person, way, slot in zip(group, lead, slots, strict=True):
+            new = self._newcomer(person, way, slot)
+            if not self._traffic.has_room(new):
+                new = replace(new, speed=0.0)
+                if not self._traffic.has_room(new):
+                    return False
+            news.append(new)
+        at = self._traffic.add(news)
+        if len(self._ids) < len(m.here) or len(self._ids) < len(self._traffic.moving.here):
+            grown = np.zeros(len(self._traffic.moving.here), np.int64)
+            grown[: len(self._ids)] = self._ids
+            self._ids = grown
+        for row, person in zip(at.tolist(), group, strict=True):
+            self._count += 1
+            self._ids[row] = self._count
+            self._people[row] = person
+            self.came.append(person)
+        if self._bodies is not None:
+            self._bodies.place(
+                at,
+                np.array([person.start for person in group]),
+                self._traffic.moving.heading[at],
+                phases=np.array([_chance(person.name, self.seed, "phase") for person in group]),
+                heights=np.array([person.height or self._bodies.height for person in group]),
+                sizes=[person.behavior.size for person in group],
+            )
+        return True
+
+    def _ways(self, group: tuple[Person, ...]) -> list[Array]:
+        """Who walks together goes the way of the first of them, each with an own beginning."""
+        ways: list[Array] = []
+        for k, person in enumerate(group):
+            try:
+                way = self._routes.way_of(person) if k == 0 or not person.stops else ways[0]
+            except (SceneError, PathError) as error:
+                raise type(error)(f"person {person.name!r}: {error}") from None
+            ways.append(way)
+        return ways
+
+    def _newcomer(self, person: Person, way: Array, slot: float) -> Newcomer:
+        b = person.behavior
+        heading = person.heading
+        if heading is None:
+            ahead = way[min(4, len(way) - 1)] - person.start
+            heading = math.atan2(*ahead) if len(way) > 1 and np.hypot(*ahead) > 1e-6 else 0.0
+        fastest = self.bounds.fastest[-1 if b.status == RUN else 0]
+        return Newcomer(
+            number=_number(person.name),
+            position=(float(person.start[0]), float(person.start[1])),
+            heading=heading,
+            way=way,
+            speed=min(person.speed, 0.95 * fastest, b.velocity),
+            wish=min(b.velocity, 0.95 * fastest),
+            radius=b.body_radius,
+            runs=b.status == RUN,
+            side=SIDES[b.preference.side],
+            keep=KEEPS[b.preference.distance],
+            waits=b.preference.patience == "wait",
+            rank=_chance(person.name, self.seed, "rank"),
+            company=-1 if person.together is None else _number(person.together),
+            slot=slot,
+            stays=person.stays,
+        )
+
+    def _add_mover(self, mover: Mover) -> int:
+        place = mover.at(np.zeros(()))
+        new = Newcomer(
+            number=_number(mover.name),
+            position=(float(place[0]), float(place[1])),
+            heading=0.0,
+            way=place[None],
+            radius=mover.radius,
+            rank=2.0,
+            mover=mover,
+        )
+        return int(self._traffic.add([new])[0])
+
+    def _step_bodies(self, bodies: Bodies, focus: Sequence[float] | None) -> None:
+        rows, m = self._rows, self._traffic.moving
+        if not len(rows):
+            return
+        speed = np.linalg.norm(m.velocity[rows], axis=-1)
+        aims = (m.target[rows] != 0.0).any(axis=-1)
+        motions = np.where(
+            self._traffic.people.runs[rows] & (speed > RUNS_FROM), MOTIONS.index(RUN), MOTIONS.index(WALK)
+        )
+        motions = np.where((speed == 0.0) & ~aims, MOTIONS.index(STAND), motions)
+        levels = None
+        if self.lod is not None and focus is not None:
+            away = np.linalg.norm(m.position[rows] - np.asarray(focus, np.float64), axis=-1)
+            levels = np.minimum(1 + (away > self.lod[0]) + (away > self.lod[1]), LEVELS)
+        bodies.step(
+            rows,
+            VehicleState(
+                position=m.position[rows],
+                velocity=m.velocity[rows],
+                acceleration=m.acceleration[rows],
+                heading=m.heading[rows],
+            ),
+            motions,
+            np.where(aims, np.inf, (m.stops[rows] - 1) / self.frame_rate),
+            levels,
+        )
+
+
+def _walker_of(scene: Scene) -> Person:
+    """The one walker of a scene is one of its people."""
+    start, goals = scene.task()
+    names = {person.name for person in scene.people}
+    name = next(n for n in ("walker", *(f"walker {k}" for k in range(2, len(names) + 3))) if n not in names)
+    return Person(
+        name=name, start=start, stops=tuple(goal[None] for goal in goals), behavior=scene.behavior, stays=True
+    )
+
+
+def _slots(group: tuple[Person, ...]) -> list[float]:
+    """Places of a group beside each other, to the left of its way, metres."""
+    widths = [2 * person.behavior.body_radius + BESIDE for person in group]
+    edges = np.concatenate(([0.0], np.cumsum(widths)))
+    return (0.5 * (edges[1:] + edges[:-1]) - 0.5 * edges[-1]).tolist() if len(group) > 1 else [0.0]
+
+
+def _number(name: str) -> int:
+    """A number that only depends on a name."""
+    return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=7).digest(), "big")
+
+
+def _chance(name: str, seed: int, what: str) -> float:
+    """A number from 0 to below 1 that only depends on a name, the seed, and what it is for."""
+    return _number(f"{what} {seed} {name}") / 2.0**56

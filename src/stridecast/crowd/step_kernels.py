@@ -1,0 +1,498 @@
+"""One frame of a crowd: all read what was, then all write what is (as RVO2 does), each in a column of stages."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from stridecast.crowd.choice_kernels import CHOICES, SHARES, weigh
+from stridecast.crowd.ground_kernels import room, standing_near
+from stridecast.crowd.neighbour_kernels import FIELDS, HX, HZ, JAMMED, PX, PZ, RADIUS, ROW, cell_of, look
+from stridecast.crowd.rule_kernels import answer
+from stridecast.crowd.rules import GIVE_WAY, HELD, ON_THE_WAY, RETURN, STAND, WAIT
+from stridecast.crowd.safety_kernels import HAIR, apart, clear_of_ground
+from stridecast.crowd.state import Cells, Ground, Limits, Moving, People, Scratch, Ways
+from stridecast.crowd.vehicle_kernels import REST, advance, stop
+from stridecast.crowd.way_kernels import company_pace, find_place, place_at, wanted, way_out
+from stridecast.geometry.kernels import kernel
+
+SIGHT = 16.0
+"""Others are looked at within this, metres ..."""
+
+SEEN = 24
+"""... and no more than so many, the nearest."""
+
+STANDING = 24
+"""So many walls and obstacles near somebody are looked at, the nearest."""
+
+REACH = 5.0
+"""... within this, metres."""
+
+DECIDES = 0.1
+"""Everybody decides anew about so often, seconds."""
+
+TRIES = 8
+"""So many velocities are tried, the best first, until one leaves room to stop."""
+
+SLOW = 0.08
+"""Who wants to go and is slower than this does not get on, m/s."""
+
+PATIENCE = 1.5
+"""Who has not got on for so long gives way, seconds; those who rather wait sooner, some by chance later."""
+
+
+STUCK = 0.7
+"""Who has not got on for so long and is blocked by somebody who wants to go elsewhere is in a jam, seconds."""
+
+ROOM = 0.5
+"""Behind people who block each other everybody steps back until there is so much room, metres ..."""
+
+STEP_BACK = 0.6
+"""... for so long at a time, seconds."""
+
+STEPPING_BACK = 0.35
+"""... as far as they do not go round: the part of them who step back."""
+
+ROUND, GOING_ROUND = math.radians(75.0), 2.0
+"""People who block each other all go to the same side, so that the jam begins to turn: how far, and for how long
+(seconds)."""
+
+BLOCKED = 1.0
+"""Who is nearer than this in front blocks the way, metres."""
+
+QUEUING = 5.0
+"""In a queue people are so many times as patient."""
+
+
+def make_scratch() -> Scratch:
+    """Room for one thread."""
+    return Scratch(
+        near=np.zeros(SEEN, np.int64),
+        gaps=np.zeros(SEEN),
+        seen=np.zeros((SEEN, FIELDS)),
+        things=np.zeros(STANDING, np.int64),
+        targets=np.zeros((CHOICES, 2)),
+        costs=np.zeros(CHOICES),
+    )
+
+
+@kernel
+def mixed(a: int, b: int, seed: int) -> float:
+    """A number from 0 to 1 that only looks random (splitmix64)."""
+    v = np.uint64(a) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(b) * np.uint64(0xBF58476D1CE4E5B9) + np.uint64(seed)
+    v = (v ^ (v >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    v = (v ^ (v >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    v = v ^ (v >> np.uint64(31))
+    return float(v >> np.uint64(11)) / 9007199254740992.0
+
+
+@kernel
+def propose(
+    people: People,
+    moving: Moving,
+    ways: Ways,
+    ground: Ground,
+    limits: Limits,
+    cells: Cells,
+    scratch: Scratch,
+    farthest: float,
+    widest: float,
+    frame: int,
+    seed: int,
+    dt: float,
+    begin: int,
+    end: int,
+) -> None:
+    """The read phase: what each of the rows ``begin`` to ``end`` would do, without touching what others read."""
+    seen, things, targets, costs = scratch.seen, scratch.things, scratch.targets, scratch.costs
+    every = max(round(DECIDES / dt), 1)
+    for c in range(begin, end):
+        if not moving.here[c]:
+            continue
+        moving.held[c] = False
+        if people.scripted[c]:
+            moving.free[c] = conflict(people, moving, cells, farthest, widest, c, False) < 0
+            continue
+        x, z = moving.position[c, 0], moving.position[c, 1]
+        standing = standing_near(ground, x, z, REACH, things)
+        decides = (frame + people.number[c]) % every == 0
+        if not decides and try_target(
+            people,
+            moving,
+            ground,
+            limits,
+            cells,
+            farthest,
+            widest,
+            things,
+            standing,
+            c,
+            moving.target[c, 0],
+            moving.target[c, 1],
+            dt,
+        ):
+            continue
+        count = look(people, moving, cells, c, SIGHT, scratch)
+        dx, dz, wish = wanted(people, moving, ways, ground, things, standing, c)
+        if people.company[c] >= 0 and wish > 0.0:
+            wish *= company_pace(seen, count, dx, dz)
+        decide(
+            people,
+            moving,
+            ways,
+            ground,
+            things,
+            standing,
+            seen,
+            count,
+            c,
+            dx,
+            dz,
+            wish,
+            frame,
+            seed,
+            every * dt if decides else dt,
+            targets,
+            costs,
+        )
+        moving.free[c] = False
+        for _ in range(TRIES):
+            best = cheapest(costs)
+            if not costs[best] < np.inf:
+                break
+            if try_target(
+                people,
+                moving,
+                ground,
+                limits,
+                cells,
+                farthest,
+                widest,
+                things,
+                standing,
+                c,
+                targets[best, 0],
+                targets[best, 1],
+                dt,
+            ):
+                moving.target[c, 0], moving.target[c, 1] = targets[best, 0], targets[best, 1]
+                break
+            same = best - best % len(SHARES) if best < CHOICES - 1 else best
+            if moving.velocity[c, 0] == 0.0 and moving.velocity[c, 1] == 0.0:
+                costs[same : same + len(SHARES)] = np.inf  # from rest the first step is the same at any speed
+            costs[best] = np.inf
+        if not moving.free[c]:
+            moving.target[c] = 0.0
+            moving.held[c] = True
+
+
+@kernel
+def cheapest(costs: np.ndarray) -> int:
+    """The first of the lowest."""
+    best = 0
+    for k in range(1, len(costs)):
+        if costs[k] < costs[best]:
+            best = k
+    return best
+
+
+@kernel
+def decide(
+    people: People,
+    moving: Moving,
+    ways: Ways,
+    ground: Ground,
+    things: np.ndarray,
+    standing: int,
+    seen: np.ndarray,
+    count: int,
+    c: int,
+    dx: float,
+    dz: float,
+    wish: float,
+    frame: int,
+    seed: int,
+    elapsed: float,
+    targets: np.ndarray,
+    costs: np.ndarray,
+) -> None:
+    """Rule and costs of what somebody may do next; out of a jam if need be."""
+    moving.jammed_next[c] = moving.retreat[c] > 0.0
+    moving.opposed[c] = False
+    if wish < REST:
+        moving.rule[c], moving.other[c], moving.contact[c], moving.chosen_side[c] = STAND, -1, np.inf, 0.0
+        targets[:], costs[:] = 0.0, np.inf
+        costs[0] = 0.0
+        return
+    speed = math.hypot(moving.velocity[c, 0], moving.velocity[c, 1])
+    if moving.retreat[c] > 0.0:
+        moving.retreat[c] -= elapsed
+        rule, other, contact, side, most = GIVE_WAY, -1, np.inf, 0.0, np.inf
+    else:
+        rule, other, contact, side, most = answer(
+            people, moving, ground, things, standing, seen, count, c, dx, dz, wish, elapsed
+        )
+        if rule == ON_THE_WAY and people.points[c] >= 2:
+            px, pz, _, _ = place_at(people, ways, c, moving.place[c])
+            if math.hypot(moving.position[c, 0] - px, moving.position[c, 1] - pz) > 0.3 + abs(people.slot[c]):
+                rule = RETURN
+        # Nobody who waits by a rule of theirs is stuck.
+        if speed < SLOW and rule != WAIT:
+            moving.stuck[c] += elapsed
+        else:
+            moving.stuck[c] = max(moving.stuck[c] - 2.0 * elapsed, 0.0) if rule != WAIT else moving.stuck[c]
+        luck = mixed(people.number[c], frame, seed)
+        patience = (0.6 if people.waits[c] else 1.0) * PATIENCE * (1.0 + 2.0 * people.rank[c])
+        m = blocker(people, seen, count, c, dx, dz)
+        if m >= 0 and moving.stuck[c] > STUCK:
+            o = seen[m]
+            opposed = o[HX] * dx + o[HZ] * dz < 0.0
+            moving.opposed[c] = opposed and people.points[int(o[ROW])] >= 2
+            moving.jammed_next[c] = o[JAMMED] > 0.0 or moving.opposed[c]
+            if not (moving.jammed_next[c] or opposed):
+                patience *= QUEUING
+            elif moving.jammed_next[c]:
+                narrow = math.hypot(o[PX], o[PZ]) - people.radius[c] - o[RADIUS] < ROOM
+                back = narrow and not opposed and luck < STEPPING_BACK
+                angle = math.pi if back else ROUND * (people.side[c] if people.side[c] != 0.0 else -1.0)
+                sine, cosine = math.sin(angle), math.cos(angle)
+                dx, dz = dx * cosine + dz * sine, dz * cosine - dx * sine
+                moving.retreat[c] = STEP_BACK if back else GOING_ROUND * (0.6 + 0.8 * luck)
+                moving.retreat_way[c, 0], moving.retreat_way[c, 1] = dx, dz
+                rule, most, side = GIVE_WAY, np.inf, 0.0
+                moving.stuck[c] = 0.5 * STUCK
+        if moving.stuck[c] > patience:
+            bx, bz, space = way_out(
+                ground,
+                things,
+                standing,
+                seen,
+                count,
+                moving.position[c, 0],
+                moving.position[c, 1],
+                people.radius[c],
+                dx,
+                dz,
+                luck,
+            )
+            moving.stuck[c] = 0.0
+            if space > 0.3:
+                moving.retreat[c] = 0.8 + 1.6 * luck
+                moving.retreat_way[c, 0], moving.retreat_way[c, 1] = bx, bz
+                dx, dz, rule, most, side = bx, bz, GIVE_WAY, np.inf, 0.0
+    moving.rule[c], moving.other[c], moving.contact[c], moving.chosen_side[c] = rule, other, contact, side
+    if rule == WAIT:
+        targets[:], costs[:] = 0.0, np.inf
+        costs[0] = 0.0
+        return
+    weigh(
+        people, moving, ground, things, standing, seen, count, c, dx, dz, wish, rule, other, side, most, targets, costs
+    )
+
+
+@kernel
+def blocker(people: People, seen: np.ndarray, count: int, c: int, dx: float, dz: float) -> int:
+    """Who is nearest in front, right in the way; -1 if nobody is."""
+    best, which = BLOCKED, -1
+    for m in range(count):
+        o = seen[m]
+        along, off = o[PX] * dx + o[PZ] * dz, o[PX] * dz - o[PZ] * dx
+        gap = math.hypot(o[PX], o[PZ]) - people.radius[c] - o[RADIUS]
+        if along > 0.0 and abs(off) < people.radius[c] + o[RADIUS] and gap < best:
+            best, which = gap, m
+    return which
+
+
+@kernel
+def try_target(
+    people: People,
+    moving: Moving,
+    ground: Ground,
+    limits: Limits,
+    cells: Cells,
+    farthest: float,
+    widest: float,
+    things: np.ndarray,
+    standing: int,
+    c: int,
+    ux: float,
+    uz: float,
+    dt: float,
+) -> bool:
+    """Propose the step towards a velocity; whether it leaves everybody the room in which they can stop."""
+    runs = people.runs[c]
+    x, z, vx, vz, ax, az, heading, turning = advance(
+        limits,
+        runs,
+        moving.position[c, 0],
+        moving.position[c, 1],
+        moving.velocity[c, 0],
+        moving.velocity[c, 1],
+        moving.acceleration[c, 0],
+        moving.acceleration[c, 1],
+        moving.heading[c],
+        moving.turning[c],
+        ux,
+        uz,
+        dt,
+    )
+    n = stop(limits, runs, x, z, vx, vz, ax, az, heading, dt, moving.meant[c])
+    moving.meant_stops[c] = n
+    out = moving.next[c]
+    out[0], out[1], out[2], out[3], out[4], out[5], out[6] = x, z, vx, vz, ax, az, heading
+    moving.next_turning[c] = turning
+    moving.free[c] = clear_of_ground(ground, things, standing, moving.meant[c], n, people.radius[c]) and (
+        conflict(people, moving, cells, farthest, widest, c, False) < 0
+    )
+    return moving.free[c]
+
+
+@kernel
+def conflict(
+    people: People,
+    moving: Moving,
+    cells: Cells,
+    farthest: float,
+    widest: float,
+    c: int,
+    proposals: bool,
+) -> int:
+    """Somebody whom the proposal of ``c`` leaves no room: by their commitment, or by a proposal that goes before.
+
+    -1 if there is nobody. ``farthest`` is the longest stopping distance of all, ``widest`` the largest radius.
+    """
+    meant, n = moving.meant[c], moving.meant_stops[c]
+    x, z = moving.position[c, 0], moving.position[c, 1]
+    own = math.hypot(meant[n - 1, 0] - x, meant[n - 1, 1] - z)
+    reach = 1.1 * (own + farthest) + people.radius[c] + widest + 0.3
+    low, high = cell_of(cells, x - reach, z - reach), cell_of(cells, x + reach, z + reach)
+    nz = cells.shape[1]
+    for i in range(low // nz, high // nz + 1):
+        for k in range(low % nz, high % nz + 1):
+            for e in range(cells.first[i * nz + k], cells.first[i * nz + k + 1]):
+                j = cells.rows[e]
+                if j == c:
+                    continue
+                if proposals and not (moving.free[j] and goes_before(people, moving, j, c)):
+                    continue
+                now = math.hypot(moving.position[j, 0] - x, moving.position[j, 1] - z)
+                if now > reach:
+                    continue
+                least = min(people.radius[c] + people.radius[j] + HAIR, now)
+                if proposals:
+                    clear = apart(meant, n, moving.meant[j], moving.meant_stops[j], 0, least)
+                else:
+                    clear = apart(meant, n, moving.path[j], moving.stops[j], 1, least)
+                if not clear:
+                    return int(j)
+    return -1
+
+
+@kernel
+def fits(
+    people: People,
+    moving: Moving,
+    ground: Ground,
+    limits: Limits,
+    state: np.ndarray,
+    radius: float,
+    runs: bool,
+    things: np.ndarray,
+    path: np.ndarray,
+    dt: float,
+) -> bool:
+    """Whether somebody who appears in a state has room to stop, and leaves it to everybody else."""
+    n = stop(limits, runs, state[0], state[1], state[2], state[3], state[4], state[5], state[6], dt, path)
+    standing = standing_near(ground, state[0], state[1], REACH, things)
+    for m in range(standing):
+        if room(ground, things[m], state[0], state[1]) < radius:
+            return False
+    if not clear_of_ground(ground, things, standing, path, n, radius):
+        return False
+    for j in range(len(moving.here)):
+        if moving.here[j] and not apart(path, n, moving.path[j], moving.stops[j], 0, radius + people.radius[j] + HAIR):
+            return False
+    return True
+
+
+@kernel
+def goes_before(people: People, moving: Moving, j: int, c: int) -> bool:
+    """Whether ``j`` goes before ``c`` where both want the same room: who is stuck longer, then who ranks higher."""
+    if moving.stuck[j] != moving.stuck[c]:
+        return moving.stuck[j] > moving.stuck[c]
+    if people.rank[j] != people.rank[c]:
+        return people.rank[j] > people.rank[c]
+    return people.number[j] < people.number[c]
+
+
+@kernel
+def settle(
+    people: People,
+    moving: Moving,
+    cells: Cells,
+    farthest: float,
+    widest: float,
+    granted: np.ndarray,
+    begin: int,
+    end: int,
+) -> None:
+    """Of two proposals that leave each other no room, the one that goes before is granted."""
+    for c in range(begin, end):
+        granted[c] = (
+            moving.here[c] and moving.free[c] and conflict(people, moving, cells, farthest, widest, c, True) < 0
+        )
+
+
+@kernel
+def write(
+    people: People, moving: Moving, ways: Ways, limits: Limits, granted: np.ndarray, dt: float, begin: int, end: int
+) -> None:
+    """The write phase: take the step proposed, or brake."""
+    for c in range(begin, end):
+        if not moving.here[c]:
+            continue
+        if granted[c]:
+            n = moving.meant_stops[c]
+            for k in range(n):
+                moving.path[c, k, 0], moving.path[c, k, 1] = moving.meant[c, k, 0], moving.meant[c, k, 1]
+            moving.stops[c] = n
+            out = moving.next[c]
+            moving.turning[c] = moving.next_turning[c]
+            moving.position[c, 0], moving.position[c, 1] = out[0], out[1]
+            moving.velocity[c, 0], moving.velocity[c, 1] = out[2], out[3]
+            moving.acceleration[c, 0], moving.acceleration[c, 1] = out[4], out[5]
+            moving.heading[c] = out[6]
+        elif people.scripted[c]:
+            moving.velocity[c] = 0.0
+            moving.held[c] = True
+        else:
+            n = moving.stops[c]
+            if n > 1:
+                for k in range(n - 1):
+                    moving.path[c, k, 0], moving.path[c, k, 1] = moving.path[c, k + 1, 0], moving.path[c, k + 1, 1]
+                moving.stops[c] = n - 1
+            x, z, vx, vz, ax, az, heading, _ = advance(
+                limits,
+                people.runs[c],
+                moving.position[c, 0],
+                moving.position[c, 1],
+                moving.velocity[c, 0],
+                moving.velocity[c, 1],
+                moving.acceleration[c, 0],
+                moving.acceleration[c, 1],
+                moving.heading[c],
+                0.0,
+                0.0,
+                0.0,
+                dt,
+            )
+            moving.position[c, 0], moving.position[c, 1] = x, z
+            moving.velocity[c, 0], moving.velocity[c, 1] = vx, vz
+            moving.acceleration[c, 0], moving.acceleration[c, 1] = ax, az
+            moving.heading[c], moving.turning[c] = heading, 0.0
+            moving.held[c] = True
+            if moving.rule[c] != STAND:
+                moving.rule[c] = HELD
+        moving.jammed[c] = moving.jammed_next[c]
+        find_place(people, moving, ways, c)
