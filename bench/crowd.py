@@ -139,8 +139,9 @@ COLUMNS: dict[str, Callable[[CrowdScore], str]] = {
         for kind in ("speed", "tangential", "lateral", "jerk")
     },
 }
-"""Of each run: who arrives; pairs that overlap and how deep; pairs with walls; people in deadlocks; time and way against
-alone; distance to Weidmann (m/s); acceleration (m/s2); root of the mean squared jerk (m/s3); samples beyond bounds."""
+"""Of each run: who arrives; pairs that overlap and how deep; pairs with walls; people in deadlocks; time and way
+against alone; distance to Weidmann (m/s); acceleration (m/s2); root of the mean squared jerk (m/s3); samples beyond
+human bounds."""
 
 
 def _median(values: np.ndarray) -> str:
