@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import stridecast as sc
@@ -202,13 +202,14 @@ def farthest(sources) -> dict[str, float]:
 
 
 @FEW
+@example(("run", 2.6, 3.5), 0.415, -0.02)  # one recorded cycle, of somebody who still gains speed
 @given(MOVING, st.floats(0, 1), st.floats(-0.3, 0.3))
 def test_no_limb_goes_beyond_what_was_recorded(learned, farthest, kind, share, turn):
-    """But for what holding a foot bends a knee: in short contacts of formula runs up to 8 degrees."""
+    """But for what holding a foot bends a knee, and what closing a cycle swings a limb."""
     mined = mine(learned, **wishes(*kind, share), turn=turn, cycles=2)
     for joint, most in farthest.items():
         bent = angle(mined.motion.rotations[:, mined.motion.skeleton.joint(joint)], quat.IDENTITY)
-        assert bent.max() < most + np.radians(10 if kind[0] == "run" else 5)
+        assert bent.max() < most + np.radians(5)
 
 
 def test_the_same_question_has_the_same_answer(learned):

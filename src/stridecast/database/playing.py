@@ -35,6 +35,9 @@ LANDING_SHARE = 0.25
 LEAVING = 0.2
 """What it was held back by is made up within this time once it is free, seconds."""
 
+FADE = 0.12
+"""What differs in velocity where the parts of a cycle meet fades within this time, seconds."""
+
 INSTANT = 1e-6
 """Times that differ by less are the same, seconds."""
 
@@ -189,7 +192,11 @@ def _blended(
 
 
 def _closed(times: Sequence[Array], features: Sequence[Array]) -> list[Array]:
-    """Features of a cycle whose parts meet: half of what differs, in pose and velocity, is spread over either part."""
+    """Features of a cycle whose parts meet: half of what differs in pose is spread over either part.
+
+    Half of what differs in velocity fades within ``FADE``: over a whole part, it would swing a limb beyond what was
+    recorded.
+    """
     ends: list[tuple[Array, Array]] = []
     starts: list[tuple[Array, Array]] = []
     for t, f in zip(times, features, strict=True):
@@ -200,14 +207,16 @@ def _closed(times: Sequence[Array], features: Sequence[Array]) -> list[Array]:
     for i, (t, f) in enumerate(zip(times, features, strict=True)):
         before, after = ends[i - 1], starts[(i + 1) % len(starts)]
         span = t[LAST] - t[FIRST]
-        u = ((t - t[FIRST]) / span)[:, None]
+        since, left = (t - t[FIRST])[:, None], (t[LAST] - t)[:, None]
+        u, fade = since / span, min(FADE, span)
         at_start = [(there - here) / 2 for there, here in zip(before, starts[i], strict=True)]
         at_end = [(there - here) / 2 for there, here in zip(after, ends[i], strict=True)]
         out.append(
             f
             + at_start[0] * (1 - u) ** 2 * (1 + 2 * u)
             + at_end[0] * u**2 * (3 - 2 * u)
-            + span * (at_start[1] * u * (1 - u) ** 2 + at_end[1] * u**2 * (u - 1))
+            + at_start[1] * since * np.maximum(1 - since / fade, 0.0) ** 2
+            - at_end[1] * left * np.maximum(1 - left / fade, 0.0) ** 2
         )
     return out
 
