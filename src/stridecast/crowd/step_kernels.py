@@ -18,6 +18,7 @@ from stridecast.crowd.way_kernels import (
     company_pace,
     find_place,
     place_at,
+    room_in,
     round_the_jam,
     wanted,
     way_out,
@@ -52,11 +53,14 @@ PATIENCE = 1.5
 STUCK = 0.7
 """Who has not got on for so long and is blocked by somebody who wants to go elsewhere is in a jam, seconds."""
 
-ROOM = 0.5
+ROOM = 0.4
 """Behind people who block each other there should be so much room, metres ..."""
 
-STEPPING_BACK, STEP_BACK = 0.35, 0.6
+STEPPING_BACK, STEP_BACK = 0.6, 1.5
 """... so this part of those who have less step back, for so long (seconds) ..."""
+
+CONTRARY = 0.1
+"""So many of them go to the other side."""
 
 GOING_ROUND = 2.0
 """... and the others go round the jam, for about so long, seconds."""
@@ -257,11 +261,13 @@ def decide(
                 patience *= QUEUING
             elif moving.jammed_next[c]:
                 narrow = math.hypot(o[PX], o[PZ]) - people.radius[c] - o[RADIUS] < ROOM
-                back = narrow and not opposed and luck < STEPPING_BACK
+                back = narrow and luck < STEPPING_BACK and room_in(seen, count, people.radius[c], -dx, -dz) > ROOM
                 if back:
                     dx, dz = -dx, -dz
                 else:
                     own = people.side[c] if people.side[c] != 0.0 else -1.0
+                    if luck > 1.0 - CONTRARY:
+                        own = -own
                     x, z = moving.position[c, 0], moving.position[c, 1]
                     dx, dz = round_the_jam(ground, things, standing, x, z, people.radius[c], dx, dz, own)
                 moving.retreat[c] = STEP_BACK if back else GOING_ROUND * (0.6 + 0.8 * luck)
