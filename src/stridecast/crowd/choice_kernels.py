@@ -54,6 +54,12 @@ HEADWAY = 0.9
 JAM = 0.12
 """Nearer than this nobody follows, metres."""
 
+FREE = 6.0
+"""Who is further ahead does not matter, metres."""
+
+GENTLY = 0.8
+"""Up to who does not go the same way people go so fast that they can stop as gently as this, m/s2."""
+
 LEAD = 0.4
 """Who goes on in front makes so much room, seconds of their speed."""
 
@@ -127,16 +133,22 @@ def weigh(
         sine, cosine = math.sin(ANGLES[a]), math.cos(ANGLES[a])
         ax, az = dx * cosine + dz * sine, dz * cosine - dx * sine  # turned to the left by the angle
         wall = free_way(ground, things, standing, x, z, ax, az, radius, 4.0)
-        ahead = 6.0 + JAM
+        top = min(fastest, most)
         for m in range(count):
             o = seen[m]
-            # One follows whom one has in front, not who stands beside or comes towards one.
-            in_front = o[PX] * ax + o[PZ] * az > IN_FRONT * math.hypot(o[PX], o[PZ])
-            if in_front and o[VX] * ax + o[VZ] * az > -0.2:
+            along = o[PX] * ax + o[PZ] * az
+            if along <= 0.0 or o[VX] * ax + o[VZ] * az < -0.2:
+                continue  # behind, or coming towards one: that is no one to follow
+            gap = disc_way(o[PX], o[PZ], ax, az, radius + o[RADIUS], FREE)
+            if gap >= FREE:
+                continue
+            if o[HX] * ax + o[HZ] * az > 0.0 and along > IN_FRONT * math.hypot(o[PX], o[PZ]):
+                # One follows whom one has in front and who goes the same way.
                 reserve = JAM_LEFT_ALONE if o[JAMMED] > 0.0 and not out else JAM
-                pace = LEAD * max(o[VX] * ax + o[VZ] * az, 0.0)
-                ahead = min(ahead, disc_way(o[PX], o[PZ], ax, az, radius + o[RADIUS], 10.0) - reserve + pace)
-        top = min(fastest * (1.0 - math.exp(-max(ahead, 0.0) / HEADWAY)), fastest, most)
+                gap += LEAD * max(o[VX] * ax + o[VZ] * az, 0.0) - reserve
+                top = min(top, fastest * (1.0 - math.exp(-max(gap, 0.0) / HEADWAY)))
+            else:
+                top = min(top, math.sqrt(2.0 * GENTLY * gap))
         wrong = (1.0 - abs(drift)) * SIDE * max(-side * sine, 0.0) - KEEP * drift * sine
         if side != 0.0 and ANGLES[a] == 0.0:
             wrong = 0.25 * (1.0 - abs(drift)) * SIDE
@@ -190,7 +202,7 @@ def people_in_the_way(
         if closing <= 0.0:
             continue
         price = danger(contact_time(o[PX], o[PZ], ux - o[EX], uz - o[EZ], min(bodies + keep, max(gap - 0.01, bodies))))
-        price *= min(closing / GENTLE, 1.0)
+        price *= min(closing / GENTLE, 1.0) ** 2
         if o[FELLOW] > 0.0:
             price *= 0.3
         if int(o[ROW]) == yields:

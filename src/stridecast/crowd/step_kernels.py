@@ -15,10 +15,10 @@ from stridecast.crowd.safety_kernels import HAIR, apart, clear_of_ground
 from stridecast.crowd.state import Cells, Ground, Limits, Moving, People, Scratch, Ways
 from stridecast.crowd.vehicle_kernels import REST, advance, stop
 from stridecast.crowd.way_kernels import (
-    RETREAT_SPEED,
     company_pace,
     find_place,
     place_at,
+    room_in,
     round_the_jam,
     wanted,
     way_out,
@@ -53,11 +53,17 @@ PATIENCE = 1.5
 STUCK = 0.7
 """Who has not got on for so long and is blocked by somebody who wants to go elsewhere is in a jam, seconds."""
 
-LEAST_ROOM = 0.12
-"""With less room in a direction nobody goes round a jam, metres."""
+ROOM = 0.4
+"""Behind people who block each other there should be so much room, metres ..."""
 
-LONGEST_RETREAT = 2.5
-"""So long people go round a jam before they try again, seconds."""
+STEPPING_BACK, STEP_BACK = 0.6, 1.5
+"""... so this part of those who have less step back, for so long (seconds) ..."""
+
+CONTRARY = 0.1
+"""So many of them go to the other side."""
+
+GOING_ROUND = 2.0
+"""... and the others go round the jam, for about so long, seconds."""
 
 BLOCKED = 1.0
 """Who is nearer than this in front blocks the way, metres."""
@@ -254,27 +260,21 @@ def decide(
             if not (moving.jammed_next[c] or opposed):
                 patience *= QUEUING
             elif moving.jammed_next[c]:
-                side = people.side[c] if people.side[c] != 0.0 else -1.0
-                bx, bz, space = round_the_jam(
-                    ground,
-                    things,
-                    standing,
-                    seen,
-                    count,
-                    moving.position[c, 0],
-                    moving.position[c, 1],
-                    people.radius[c],
-                    dx,
-                    dz,
-                    side,
-                    luck,
-                )
-                moving.stuck[c] = 0.0
-                side, patience = 0.0, np.inf
-                if space > LEAST_ROOM:
-                    dx, dz, rule, most = bx, bz, GIVE_WAY, np.inf
-                    moving.retreat[c] = min(space / RETREAT_SPEED, LONGEST_RETREAT)
-                    moving.retreat_way[c, 0], moving.retreat_way[c, 1] = bx, bz
+                narrow = math.hypot(o[PX], o[PZ]) - people.radius[c] - o[RADIUS] < ROOM
+                back = narrow and luck < STEPPING_BACK and room_in(seen, count, people.radius[c], -dx, -dz) > ROOM
+                if back:
+                    dx, dz = -dx, -dz
+                else:
+                    own = people.side[c] if people.side[c] != 0.0 else -1.0
+                    if luck > 1.0 - CONTRARY:
+                        own = -own
+                    x, z = moving.position[c, 0], moving.position[c, 1]
+                    dx, dz = round_the_jam(ground, things, standing, x, z, people.radius[c], dx, dz, own)
+                moving.retreat[c] = STEP_BACK if back else GOING_ROUND * (0.6 + 0.8 * luck)
+                moving.retreat_way[c, 0], moving.retreat_way[c, 1] = dx, dz
+                rule, most, side = GIVE_WAY, np.inf, 0.0
+                moving.stuck[c] = 0.5 * STUCK
+                patience = np.inf
         if moving.stuck[c] > patience:
             bx, bz, space = way_out(
                 ground,
