@@ -62,7 +62,7 @@ STEPPING_BACK, STEP_BACK = 0.6, 1.5
 CONTRARY = 0.1
 """So many of them go to the other side."""
 
-GOING_ROUND = 2.0
+GOING_ROUND = 3.0
 """... and the others go round the jam, for about so long, seconds."""
 
 BLOCKED = 1.0
