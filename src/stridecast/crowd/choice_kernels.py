@@ -22,10 +22,12 @@ ANGLES = np.radians(
 )
 """Directions looked at, from the wished one."""
 
-SHARES = np.array([1.0, 0.7, 0.4, 0.15])
-"""Shares of the speed that is possible in a direction; standing is looked at besides."""
+SINES, COSINES = np.sin(ANGLES), np.cos(ANGLES)
 
-CHOICES = len(ANGLES) * len(SHARES) + 1
+SHARES = np.array([1.0, 0.7, 0.4, 0.15])
+"""Shares of the speed that is possible in a direction. The present direction and standing are looked at besides."""
+
+CHOICES = (len(ANGLES) + 1) * len(SHARES) + 1
 
 HURRY = 1.15
 """Who goes first may hurry by this factor."""
@@ -48,10 +50,10 @@ DETOUR = 0.8
 IMPATIENCE = 0.3
 """How the price of standing grows with every second in which one does not get on."""
 
-HEADWAY = 0.9
-"""Distance in front at which people take up two thirds of their speed, metres."""
+HEADWAY = 0.4
+"""Distance in front at which people have two thirds of their speed, metres."""
 
-JAM = 0.12
+JAM = 0.08
 """Nearer than this nobody follows, metres."""
 
 FREE = 6.0
@@ -60,7 +62,7 @@ FREE = 6.0
 GENTLY = 0.8
 """Up to who does not go the same way people go so fast that they can stop as gently as this, m/s2."""
 
-LEAD = 0.4
+LEAD = 0.8
 """Who goes on in front makes so much room, seconds of their speed."""
 
 IN_FRONT = 0.7
@@ -84,7 +86,7 @@ TURN = 0.15
 SIDE = 0.35
 """Price of the wrong side."""
 
-CHANGE = 0.12
+CHANGE = 0.2
 """Price of changing one's mind."""
 
 
@@ -129,9 +131,15 @@ def weigh(
     still = aim > 0.0 and math.hypot(moving.velocity[c, 0], moving.velocity[c, 1]) < 0.3
     radius, keep = people.radius[c], min(people.keep[c], 0.5)
     n = 0
-    for a in range(len(ANGLES)):
-        sine, cosine = math.sin(ANGLES[a]), math.cos(ANGLES[a])
-        ax, az = dx * cosine + dz * sine, dz * cosine - dx * sine  # turned to the left by the angle
+    for a in range(len(ANGLES) + 1):
+        if a < len(ANGLES):
+            sine, cosine = SINES[a], COSINES[a]
+            ax, az = dx * cosine + dz * sine, dz * cosine - dx * sine  # turned to the left by the angle
+        elif aim > 0.0:
+            ax, az = moving.target[c, 0] / aim, moving.target[c, 1] / aim
+            sine, cosine = ax * dz - az * dx, ax * dx + az * dz
+        else:
+            ax, az, sine, cosine = dx, dz, 0.0, 1.0
         wall = free_way(ground, things, standing, x, z, ax, az, radius, 4.0)
         top = min(fastest, most)
         for m in range(count):
@@ -150,7 +158,7 @@ def weigh(
             else:
                 top = min(top, math.sqrt(2.0 * GENTLY * gap))
         wrong = (1.0 - abs(drift)) * SIDE * max(-side * sine, 0.0) - KEEP * drift * sine
-        if side != 0.0 and ANGLES[a] == 0.0:
+        if side != 0.0 and a == 0:
             wrong = 0.25 * (1.0 - abs(drift)) * SIDE
         if still:
             wrong += TURN * (1.0 - (ax * moving.target[c, 0] + az * moving.target[c, 1]) / aim)

@@ -62,7 +62,7 @@ STEPPING_BACK, STEP_BACK = 0.6, 1.5
 CONTRARY = 0.1
 """So many of them go to the other side."""
 
-GOING_ROUND = 2.0
+GOING_ROUND = 3.0
 """... and the others go round the jam, for about so long, seconds."""
 
 BLOCKED = 1.0
@@ -355,7 +355,8 @@ def try_target(
     out = moving.next[c]
     out[0], out[1], out[2], out[3], out[4], out[5], out[6] = x, z, vx, vz, ax, az, heading
     moving.next_turning[c] = turning
-    moving.free[c] = clear_of_ground(ground, things, standing, moving.meant[c], n, people.radius[c]) and (
+    x, z = moving.position[c, 0], moving.position[c, 1]
+    moving.free[c] = clear_of_ground(ground, things, standing, x, z, moving.meant[c], n, people.radius[c]) and (
         conflict(people, moving, cells, farthest, widest, c, False) < 0
     )
     return moving.free[c]
@@ -421,7 +422,7 @@ def fits(
     for m in range(standing):
         if room(ground, things[m], state[0], state[1]) < radius:
             return False
-    if not clear_of_ground(ground, things, standing, path, n, radius):
+    if not clear_of_ground(ground, things, standing, state[0], state[1], path, n, radius):
         return False
     for j in range(len(moving.here)):
         if moving.here[j] and not apart(path, n, moving.path[j], moving.stops[j], 0, radius + people.radius[j] + HAIR):

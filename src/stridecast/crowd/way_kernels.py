@@ -20,7 +20,7 @@ WINDOW = 2.0
 BRAKING = 0.7
 """Who will stand at the end of the way slows down as gently as this, m/s2."""
 
-RETREAT_SPEED = 0.5
+RETREAT_SPEED = 0.8
 """Who makes room does so at this speed, m/s."""
 
 ROUND = np.radians(np.array([75.0, 45.0, -75.0, -45.0, 20.0]))
