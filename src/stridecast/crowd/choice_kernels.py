@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from stridecast.crowd.ground_kernels import disc_way, free_way
-from stridecast.crowd.neighbour_kernels import EX, EZ, FELLOW, HX, HZ, JAMMED, PX, PZ, RADIUS, ROW, VX, VZ
+from stridecast.crowd.neighbour_kernels import BX, BZ, EX, EZ, FELLOW, HX, HZ, JAMMED, PX, PZ, RADIUS, ROW, VX, VZ
 from stridecast.crowd.rule_kernels import contact_time
 from stridecast.crowd.rules import GO_FIRST, GO_ON
 from stridecast.crowd.state import Ground, Moving, People
@@ -150,7 +150,7 @@ def weigh(
             gap = disc_way(o[PX], o[PZ], ax, az, radius + o[RADIUS], FREE)
             if gap >= FREE:
                 continue
-            if o[HX] * ax + o[HZ] * az > 0.0 and along > IN_FRONT * math.hypot(o[PX], o[PZ]):
+            if o[BX] * ax + o[BZ] * az > 0.0 and along > IN_FRONT * math.hypot(o[PX], o[PZ]):
                 # One follows whom one has in front and who goes the same way.
                 reserve = JAM_LEFT_ALONE if o[JAMMED] > 0.0 and not out else JAM
                 gap += LEAD * max(o[VX] * ax + o[VZ] * az, 0.0) - reserve

@@ -15,9 +15,10 @@ SETTLING = 0.25
 AT_REST = 0.5
 """Of two people the one is nearer who would be here sooner if everybody came at this speed besides their own, m/s."""
 
-PX, PZ, EX, EZ, VX, VZ, RADIUS, FELLOW, RANK, ROW, HX, HZ, JAMMED, FIELDS = range(14)
+PX, PZ, EX, EZ, VX, VZ, RADIUS, FELLOW, RANK, ROW, HX, HZ, BX, BZ, JAMMED, FIELDS = range(16)
 """Columns of what is seen: place from oneself, velocity expected and present one, radius, whether they walk together
-with oneself, rank, row, where they face, whether they are jammed."""
+with oneself, rank, row, where they face, where they are bound for, whether they are
+jammed."""
 
 
 @kernel
@@ -97,6 +98,7 @@ def look(people: People, moving: Moving, cells: Cells, c: int, reach: float, scr
         out[FELLOW] = 1.0 if people.company[c] >= 0 and people.company[c] == people.company[j] else 0.0
         out[RANK] = people.rank[j]
         out[ROW] = j
+        out[BX], out[BZ] = moving.bound[j, 0], moving.bound[j, 1]
         out[JAMMED] = 1.0 if moving.jammed[j] else 0.0
         out[HX], out[HZ] = math.sin(moving.heading[j]), math.cos(moving.heading[j])
     return n

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from stridecast.crowd.ground_kernels import free_way
-from stridecast.crowd.neighbour_kernels import EX, EZ, FELLOW, HX, HZ, PX, PZ, RADIUS, RANK, ROW
+from stridecast.crowd.neighbour_kernels import BX, BZ, EX, EZ, FELLOW, PX, PZ, RADIUS, RANK, ROW
 from stridecast.crowd.rules import (
     BEHIND,
     FOLLOW,
@@ -49,7 +49,7 @@ CLOSING_UP = 0.15
 """Who follows may be so much faster, m/s."""
 
 QUEUES = 0.3
-"""Somebody who stands and faces the way one goes (cosine) waits in a queue."""
+"""Somebody who stands and is bound the way one goes (cosine) waits in a queue."""
 
 CLOSE = 1.2
 """... if they would meet within this, seconds."""
@@ -122,7 +122,7 @@ def answer(
     side = people.side[c]
     if side == 0.0:  # the nearer one, else the right
         side = -1.0 if off > -OFFSET * (radius + o[RADIUS]) else 1.0
-    if not moves and o[HX] * dx + o[HZ] * dz > QUEUES and people.points[j] >= 2:
+    if not moves and o[BX] * dx + o[BZ] * dz > QUEUES:
         return FOLLOW, j, soonest, 0.0, math.inf
     if not moves:
         rule = PASS_ROUND

@@ -60,6 +60,7 @@ class Moving(NamedTuple):
     heading: Array  # N
     turning: Array  # N, side of a reversal under way
     place: Array  # N, how far along the way, metres
+    bound: Array  # N 2, direction in which the way leads on the whole; none for who stands
     # decision
     target: Array  # N 2, velocity that is aimed at
     rule: Array  # N, code of the rule that is followed
@@ -151,6 +152,7 @@ def make_moving(count: int, frames: int) -> Moving:
         heading=zeros(),
         turning=zeros(),
         place=zeros(),
+        bound=zeros(2),
         target=zeros(2),
         rule=np.zeros(count, np.int64),
         other=np.full(count, -1),

@@ -8,7 +8,7 @@ import numpy as np
 
 from stridecast.crowd.choice_kernels import CHOICES, SHARES, weigh
 from stridecast.crowd.ground_kernels import room, standing_near
-from stridecast.crowd.neighbour_kernels import FIELDS, HX, HZ, JAMMED, PX, PZ, RADIUS, ROW, cell_of, look
+from stridecast.crowd.neighbour_kernels import BX, BZ, FIELDS, JAMMED, PX, PZ, RADIUS, cell_of, look
 from stridecast.crowd.rule_kernels import answer
 from stridecast.crowd.rules import GIVE_WAY, HELD, ON_THE_WAY, RETURN, STAND, WAIT
 from stridecast.crowd.safety_kernels import HAIR, apart, clear_of_ground
@@ -17,6 +17,7 @@ from stridecast.crowd.vehicle_kernels import REST, advance, stop
 from stridecast.crowd.way_kernels import (
     company_pace,
     find_place,
+    look_ahead,
     place_at,
     room_in,
     round_the_jam,
@@ -64,6 +65,9 @@ CONTRARY = 0.1
 
 GOING_ROUND = 3.0
 """... and the others go round the jam, for about so long, seconds."""
+
+OPPOSED = -0.3
+"""Whose ways lead apart by more than this (cosine) are in each other's way."""
 
 BLOCKED = 1.0
 """Who is nearer than this in front blocks the way, metres."""
@@ -254,8 +258,8 @@ def decide(
         m = blocker(people, seen, count, c, dx, dz)
         if m >= 0 and moving.stuck[c] > STUCK:
             o = seen[m]
-            opposed = o[HX] * dx + o[HZ] * dz < 0.0
-            moving.opposed[c] = opposed and people.points[int(o[ROW])] >= 2
+            opposed = o[BX] * moving.bound[c, 0] + o[BZ] * moving.bound[c, 1] < OPPOSED
+            moving.opposed[c] = opposed
             moving.jammed_next[c] = o[JAMMED] > 0.0 or moving.opposed[c]
             if not (moving.jammed_next[c] or opposed):
                 patience *= QUEUING
@@ -510,3 +514,4 @@ def write(
                 moving.rule[c] = HELD
         moving.jammed[c] = moving.jammed_next[c]
         find_place(people, moving, ways, c)
+        look_ahead(people, moving, ways, c)

@@ -121,6 +121,8 @@ class Traffic:
         ahead = np.array([np.sin(new.heading), np.cos(new.heading)])
         m.position[row], m.heading[row], m.velocity[row] = new.position, new.heading, new.speed * ahead
         m.target[row] = m.velocity[row]
+        if len(new.way) > 1:
+            m.bound[row] = ahead
         state = (*m.position[row], *m.velocity[row], 0.0, 0.0, new.heading)
         m.stops[row] = stop(self.limits, bool(new.runs), *map(float, state), 1.0 / self.frame_rate, m.path[row])
         if new.mover is not None:

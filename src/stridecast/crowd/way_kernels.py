@@ -17,6 +17,9 @@ LOOK = 1.6
 WINDOW = 2.0
 """The place on the way is looked for so far ahead of the last one, metres."""
 
+OVERVIEW = 4.0
+"""Where somebody is bound for is told by the place of their way so far ahead, metres."""
+
 BRAKING = 0.7
 """Who will stand at the end of the way slows down as gently as this, m/s2."""
 
@@ -50,6 +53,20 @@ def find_place(people: People, moving: Moving, ways: Ways, c: int) -> None:
             best, place = gap, ways.along[k] + u * length
         k += 1
     moving.place[c] = max(place, moving.place[c])
+
+
+@kernel
+def look_ahead(people: People, moving: Moving, ways: Ways, c: int) -> None:
+    """Take up where the way leads on the whole."""
+    if people.points[c] < 2:
+        moving.bound[c, 0], moving.bound[c, 1] = 0.0, 0.0
+        return
+    px, pz, tx, tz = place_at(people, ways, c, moving.place[c] + OVERVIEW)
+    gx, gz = px - moving.position[c, 0], pz - moving.position[c, 1]
+    gap = math.hypot(gx, gz)
+    if gap > 1e-6:
+        tx, tz = gx / gap, gz / gap
+    moving.bound[c, 0], moving.bound[c, 1] = tx, tz
 
 
 @kernel
