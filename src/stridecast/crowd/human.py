@@ -153,10 +153,10 @@ def make_human(
         raise InputError(f"the frame rate must lie between 10 and 240 Hz, not at {frame_rate}")
     if noise is not None and not (np.isfinite(noise) and 0 <= noise <= 1):
         raise InputError(f"noise must lie between 0 and 1 m, not at {noise}")
-    stretches = _stretches(trajectories)
-    if not stretches:
+    present = stretches(trajectories)
+    if not present:
         return HumanTracks(frame_rate=frame_rate, tracks=())
-    references = [_reference(trajectories, rows, bounds, frame_rate, noise) for _, rows in stretches]
+    references = [_reference(trajectories, rows, bounds, frame_rate, noise) for _, rows in present]
     starts = np.concatenate(([0], np.cumsum([len(r.points) for r in references])))
     out = np.zeros((int(starts[-1]), 7))
     human_kernels.follow(
@@ -174,7 +174,7 @@ def make_human(
     )
     tracks = [
         _track(trajectories, person, rows, reference, out[first:last], bounds, frame_rate)
-        for (person, rows), reference, first, last in zip(stretches, references, starts[:-1], starts[1:], strict=True)
+        for (person, rows), reference, first, last in zip(present, references, starts[:-1], starts[1:], strict=True)
     ]
     return HumanTracks(frame_rate=frame_rate, tracks=tuple(tracks))
 
@@ -190,7 +190,7 @@ class _Reference:
     noise: float
 
 
-def _stretches(trajectories: Trajectories) -> list[tuple[int, slice]]:
+def stretches(trajectories: Trajectories) -> list[tuple[int, slice]]:
     """Rows in which a person is there all the time.
 
     Raises

@@ -33,7 +33,7 @@ FLUSH = 1.0
 FULL = 1 << 20
 """... or when there are so many bytes."""
 
-ROW = "%d,%.6f,%.8f,%.8f,%.6f,%.6f\n"
+ROW = "%d,%.9f,%.8f,%.8f,%.6f,%.6f\n"
 """Of places: fine enough for accelerations and their change to come out of them."""
 
 LONGEST_NAME = 80
@@ -181,7 +181,7 @@ class CrowdFiles:
         path = self._place_of(number, name)
         write_bvh(path, motion)
         self.motions.append(path)
-        row = (number, name, f"{start:.6f}", f"{motion.seconds:.6f}", motion.frames, f"{height:.3f}", path.name)
+        row = (number, name, f"{start:.9f}", f"{motion.seconds:.9f}", motion.frames, f"{height:.3f}", path.name)
         self._parts[1].add(_csv_row(row))
         return path
 
@@ -217,7 +217,7 @@ def _open_beside(path: Path) -> tuple[Path, BinaryIO]:
     for k in count(1):
         part = path.with_suffix(f".part{k if k > 1 else ''}.csv")
         try:
-            return part, part.open("xb", buffering=0)  # type: ignore[return-value]
+            return part, part.open("xb", buffering=0)
         except FileExistsError:
             continue
         except OSError as error:
