@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import repeat
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from stridecast.crowd.baking import filmed
-from stridecast.crowd.bodies import POOL, Bodies, motions_of, scaled_to
+from stridecast.crowd.bodies import Bodies, motions_of, scaled_to
 from stridecast.crowd.bounds import HumanBounds
 from stridecast.crowd.human import BOUNDS, HumanTrack, TrackReport, make_human, stretches
 from stridecast.errors import InputError
@@ -20,6 +21,9 @@ from stridecast.model.pose import VehicleState
 from stridecast.model.trajectories import Trajectories
 
 Array = np.ndarray
+
+AT_A_TIME = 128
+"""So many people are dressed at a time."""
 
 LOOKS_AHEAD = 0.25
 """So long before somebody moves off the body knows of it, and so long braking must go on to count, seconds."""
@@ -196,15 +200,13 @@ def _dressed(
 ) -> Iterator[DressedPerson]:
     for part in _parts(trajectories):
         tracks = make_human(_some(trajectories, part), bounds, rate, noise=noise).tracks
-        motions: list[Motion | None] = [None] * len(tracks)
-        for first in range(0, len(tracks) if bodies is not None else 0, POOL):
-            few = tracks[first : first + POOL]
-            assert bodies is not None
-            motions[first : first + POOL] = _motions(database, few, bounds, rate, heights, bodies)
-        for track, motion in zip(tracks, motions, strict=True):
-            yield DressedPerson(
-                person=track.person, start=track.start, motion=motion, vehicle=track.vehicle, report=track.report
-            )
+        for first in range(0, len(tracks), AT_A_TIME):
+            few = tracks[first : first + AT_A_TIME]
+            motions = repeat(None) if bodies is None else _motions(database, few, bounds, rate, heights, bodies)
+            for track, motion in zip(few, motions, strict=False):
+                yield DressedPerson(
+                    person=track.person, start=track.start, motion=motion, vehicle=track.vehicle, report=track.report
+                )
         if progress is not None:
             progress(part.stop, len(trajectories))
 
@@ -212,8 +214,8 @@ def _dressed(
 def _parts(trajectories: Trajectories) -> Iterator[slice]:
     """Rows of as many people as are dressed at a time."""
     rows = [rows for _, rows in trajectories.each()]
-    for first in range(0, len(rows), POOL):
-        some = rows[first : first + POOL]
+    for first in range(0, len(rows), AT_A_TIME):
+        some = rows[first : first + AT_A_TIME]
         yield slice(some[0].start, some[-1].stop)
 
 
@@ -249,7 +251,7 @@ def _motions(
     rate: float,
     heights: Mapping[int, float],
     bodies: Bodies,
-) -> list[Motion]:
+) -> Iterator[Motion]:
     """Bodies for some tracks; all begin in the same step, whatever their clocks say."""
     lengths = np.array([len(track) for track in tracks])
     count, longest, joints = len(tracks), int(lengths.max()), database.skeleton.joints
@@ -281,16 +283,9 @@ def _motions(
             rests[k, rows],
         )
         roots[rows, k], rotations[rows, k] = bodies.roots[rows], bodies.rotations[rows]
-    return [
-        filmed(
-            roots[k, :end],
-            rotations[k, :end],
-            scaled_to(database.skeleton, heights.get(track.person)),
-            rate,
-            str(track.person),
-        )
-        for k, (track, end) in enumerate(zip(tracks, lengths.tolist(), strict=True))
-    ]
+    for k, (track, end) in enumerate(zip(tracks, lengths.tolist(), strict=True)):
+        skeleton = scaled_to(database.skeleton, heights.get(track.person))
+        yield filmed(roots[k, :end], rotations[k, :end], skeleton, rate, str(track.person))
 
 
 def rests_of(speeds: Float[Array, "frames"], rate: float) -> Float[Array, "frames"]:
