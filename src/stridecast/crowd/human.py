@@ -38,6 +38,9 @@ NEAR = 0.1
 COARSE = 0.02
 """What a source does beyond the bounds by less than this is not counted, metres (30 samples a second)."""
 
+SLACK = 1.15
+"""Nor what is beyond them by less than this factor: smoothing alone shifts accelerations by as much."""
+
 ROUNDS = 14
 """So often a reference is made stiffer where it asks for too much."""
 
@@ -341,9 +344,9 @@ def _beyond(
     most, low, high, wide = bounds.at(speed)
     found = (
         speed > bounds.fastest[-1],
-        (tangential > high) | (tangential < low),
-        np.abs(lateral) > wide + 0.1,
-        jerk > most,
+        (tangential > SLACK * high) | (tangential < SLACK * low),
+        (np.abs(lateral) > SLACK * wide + 0.1) & (speed > STRIDES),  # slower, people turn on the spot
+        jerk > SLACK * most,
     )
     at = np.clip(np.round(times * GRID).astype(np.int64), 0, len(grid) - 1)
     frames = np.minimum(np.searchsorted(moments, times), len(moments) - 1)
