@@ -99,11 +99,12 @@ def test_a_motion_for_each_with_an_index(scene, database, tmp_path):
     out = tmp_path / "out.bvh"
     told = json.loads(call("crowd", scene, "--database", database, "-o", out, "--json").stdout)
     assert (told["came"], told["arrived"], told["there"], told["overlaps"]) == (2, 2, 0, 0)
+    assert told["done"] is True
     assert told["motions"] == [str(tmp_path / "out.Ann.bvh"), str(tmp_path / "out.ann.2.bvh")]
     assert told["output"] == [str(tmp_path / "out.csv"), str(tmp_path / "out.people.csv")]
     with (tmp_path / "out.people.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [(row["id"], row["name"], row["height"]) for row in rows][0] == ("1", "Ann", "1.500")
+    assert next((row["id"], row["name"], row["height"]) for row in rows) == ("1", "Ann", "1.500")
     places = load_trajectories(tmp_path / "out.csv")
     for row in rows:
         motion = load_motion(tmp_path / row["file"])
@@ -131,6 +132,7 @@ def test_options_reach_the_crowd(scene, database, tmp_path):
         call("crowd", scene, "--database", database, "-o", out, "--json", "--rate", 60, "--seconds", 1).stdout
     )
     assert (told["frame_rate"], told["frames"], told["seconds"], told["there"]) == (60.0, 60, 1.0, 2)
+    assert told["done"] is False
 
 
 def test_a_crowd_that_cannot_be_is_refused(scene, database, tmp_path):

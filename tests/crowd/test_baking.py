@@ -32,7 +32,7 @@ def baked(formula_database):
 
 
 def test_everybody_is_filmed_from_appearance_to_leaving(baked):
-    crowd, baking, frames = baked
+    crowd, _, frames = baked
     finished = [one for item in frames for one in item.finished]
     assert sorted(one.number for one in finished) == [1, 2]
     for one in finished:

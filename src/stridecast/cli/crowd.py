@@ -10,7 +10,7 @@ import typer
 from stridecast.cli.databases import DatabaseOption, open_database
 
 if TYPE_CHECKING:
-    from stridecast.crowd.baking import Baking, Tally
+    from stridecast.crowd.baking import Baking
     from stridecast.crowd.crowd import CrowdFrame
     from stridecast.formats.crowd_files import CrowdFiles
 
@@ -86,7 +86,7 @@ def crowd(
     if as_json:
         screen.print_json(_summary(baking, files))
     elif not quiet:
-        _tell(tally, people.frame_rate, files)
+        _tell(baking, files)
     if tally.overlaps:
         screen.tell_note(
             f"bodies overlapped {tally.overlaps} times, by up to {100 * tally.deepest:.2g} cm: this should never be"
@@ -100,11 +100,12 @@ def _write_frame(files: CrowdFiles, frame: CrowdFrame) -> None:
     files.add_rows(frame.ids, np.full(len(frame.ids), frame.time), frame.positions, frame.headings, speeds)
 
 
-def _tell(tally: Tally, rate: float, files: CrowdFiles) -> None:
+def _tell(baking: Baking, files: CrowdFiles) -> None:
     from rich.markup import escape
 
     from stridecast.cli import screen
 
+    tally, rate = baking.tally, baking.crowd.frame_rate
     waiting = f", {tally.waiting} waiting outside for room" if tally.waiting else ""
     screen.out.print(
         f"{tally.came} people came, {tally.arrived} arrived, {tally.there} still there{waiting}; "
@@ -114,6 +115,8 @@ def _tell(tally: Tally, rate: float, files: CrowdFiles) -> None:
     names = ", ".join(str(path) for path in files.files)
     said = f"{tally.frames} frames, {tally.frames / rate:.1f} s, {tally.metres:.1f} m walked"
     screen.out.print(f"{said}: {motions}[bold]{escape(names)}[/]")
+    if baking.until_done and not baking.crowd.done:
+        screen.out.print("[yellow]it ended with people still on their way: more --seconds let them arrive[/]")
 
 
 def _summary(baking: Baking, files: CrowdFiles) -> dict[str, object]:
@@ -125,6 +128,7 @@ def _summary(baking: Baking, files: CrowdFiles) -> dict[str, object]:
         "frames": tally.frames,
         "seconds": tally.frames / rate,
         "seed": baking.crowd.seed,
+        "done": baking.crowd.done,
         "came": tally.came,
         "arrived": tally.arrived,
         "there": tally.there,

@@ -18,8 +18,10 @@ from stridecast.crowd.ground import ground_of
 from stridecast.crowd.population import Due, Population
 from stridecast.crowd.routes import Routes
 from stridecast.crowd.state import make_limits
+from stridecast.crowd.step_kernels import propose
 from stridecast.crowd.traffic import ARRIVED, Newcomer, Traffic
 from stridecast.errors import InputError, PathError, SceneError
+from stridecast.geometry.kernels import is_compiled
 from stridecast.model.database import MotionDatabase
 from stridecast.model.people import Mover, Person
 from stridecast.model.pose import VehicleState
@@ -158,6 +160,8 @@ class Crowd:
         self.turned_away: tuple[Person, ...] = ()
         self._held_back: list[tuple[Due, int]] = []
         self._next: Due | None = next(self._coming, None)
+        if not propose.signatures and not is_compiled(propose):
+            log.warning("compiling the crowd, once for this machine and version: this takes a minute")
         self._movers = [self._add_mover(mover) for mover in scene.movers]
         self._let_in(progress)
 
