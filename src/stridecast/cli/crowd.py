@@ -107,6 +107,8 @@ def _tell(baking: Baking, files: CrowdFiles) -> None:
 
     tally, rate = baking.tally, baking.crowd.frame_rate
     waiting = f", {tally.waiting} waiting outside for room" if tally.waiting else ""
+    if tally.turned_away:
+        waiting += f", {tally.turned_away} stayed out as there is no way for them"
     screen.out.print(
         f"{tally.came} people came, {tally.arrived} arrived, {tally.there} still there{waiting}; "
         f"{tally.most} at once at most, {tally.overlaps} overlaps"
@@ -133,6 +135,7 @@ def _summary(baking: Baking, files: CrowdFiles) -> dict[str, object]:
         "arrived": tally.arrived,
         "there": tally.there,
         "waiting": tally.waiting,
+        "turned_away": tally.turned_away,
         "most_at_once": tally.most,
         "overlaps": tally.overlaps,
         "deepest_overlap": tally.deepest,

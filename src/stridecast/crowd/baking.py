@@ -83,9 +83,9 @@ class Tally:
     ----------
     frames
         Frames.
-    came, arrived, there, waiting
-        People who have come, who have left at their last stop or stand there for good, who are still there, and who
-        wait outside for room.
+    came, arrived, there, waiting, turned_away
+        People who have come, who have left at their last stop or stand there for good, who are still there, who wait
+        outside for room, and who stay out as there is no way for them.
     most
         So many were there at once.
     overlaps
@@ -102,6 +102,7 @@ class Tally:
     arrived: int = 0
     there: int = 0
     waiting: int = 0
+    turned_away: int = 0
     most: int = 0
     overlaps: int = 0
     deepest: float = 0.0
@@ -182,6 +183,7 @@ class Baking:
         crowd, t = self.crowd, self.tally
         t.frames += 1
         t.came, t.there, t.waiting = len(crowd.came), len(frame.ids), crowd.waiting
+        t.turned_away = len(crowd.turned_away)
         t.arrived = len(crowd.left) + len(crowd.at_last_stop())
         t.most = max(t.most, t.there)
         t.metres += float(np.linalg.norm(frame.velocities, axis=-1).sum()) / crowd.frame_rate
