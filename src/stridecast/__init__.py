@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from stridecast.building.build import build
+    from stridecast.crowd.crowd import Crowd
+    from stridecast.crowd.dressing import dress
     from stridecast.database.mining import Mined, mine
     from stridecast.errors import (
         DatabaseError,
@@ -34,11 +36,14 @@ if TYPE_CHECKING:
     from stridecast.formats.recordings import load_motion, load_skeleton
     from stridecast.formats.scenes import load_scene, save_scene
     from stridecast.formats.store import load_database, save_database
+    from stridecast.formats.trajectories import load_trajectories, save_trajectories
     from stridecast.model.database import MotionDatabase
     from stridecast.model.motion import Motion
+    from stridecast.model.people import Person, Source
     from stridecast.model.pose import Pose, VehicleState
     from stridecast.model.scene import Behavior, Scene
     from stridecast.model.skeleton import Skeleton
+    from stridecast.model.trajectories import Trajectories
     from stridecast.paths.follow import walk_scene
     from stridecast.samples.library import sample_database
     from stridecast.samples.recordings import fetch
@@ -66,6 +71,13 @@ _HOME = {
     "load_scene": "formats.scenes",
     "save_scene": "formats.scenes",
     "walk_scene": "paths.follow",
+    "Crowd": "crowd.crowd",
+    "dress": "crowd.dressing",
+    "Person": "model.people",
+    "Source": "model.people",
+    "Trajectories": "model.trajectories",
+    "load_trajectories": "formats.trajectories",
+    "save_trajectories": "formats.trajectories",
     "SceneError": "errors",
     "PathError": "errors",
     "SteeringGains": "steering.force",
@@ -98,7 +110,14 @@ __all__ = [  # noqa: RUF022
     "save_scene",
     "walk_scene",
     "write_bvh",
+    "Crowd",
+    "dress",
+    "load_trajectories",
+    "save_trajectories",
+    "Trajectories",
     "Scene",
+    "Person",
+    "Source",
     "Behavior",
     "Motion",
     "MotionDatabase",

@@ -16,6 +16,12 @@ Database = Annotated[
 ]
 """The argument that names it."""
 
+DatabaseOption = Annotated[
+    Path | None,
+    typer.Option("--database", metavar="DB", help="A motion database; the sample database if left out."),
+]
+"""The same as an option."""
+
 
 def open_database(path: Path | None, *, quiet: bool = False) -> MotionDatabase:
     """Load the database that is named, else the sample database, which may have to be made first.

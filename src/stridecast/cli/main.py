@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from stridecast.cli import build, fetch, mine, samples, score, show, walk
+from stridecast.cli import build, crowd, dress, fetch, mine, samples, score, show, walk
 from stridecast.errors import InputError
 
 
@@ -34,6 +34,8 @@ app.command("build")(build.build)
 app.command("show")(show.show)
 app.command("mine")(mine.mine)
 app.command("walk")(walk.walk)
+app.command("crowd")(crowd.crowd)
+app.command("dress")(dress.dress)
 app.command("samples")(samples.samples)
 app.command("fetch")(fetch.fetch)
 app.command("score")(score.score)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -24,6 +25,18 @@ def tell_error(message: str) -> None:
     """One line on stderr."""
     err.print("[bold red]error:[/]", end=" ")
     err.print(message, markup=False, soft_wrap=True)
+
+
+def tell_note(message: str) -> None:
+    """Something worth knowing, on stderr."""
+    err.print("[yellow]note:[/]", end=" ")
+    err.print(message, markup=False, soft_wrap=True)
+
+
+def tell_kept(parts: Sequence[Path], motions: Sequence[Path]) -> None:
+    """Say what is left of something that was not finished."""
+    finished = f", and {len(motions)} BVH ({motions[-1].name} is the last)" if motions else ""
+    tell_note(f"what was written so far stays in {', '.join(map(str, parts))}{finished}")
 
 
 def print_json(content: Mapping[str, object]) -> None:
@@ -69,5 +82,4 @@ class _Notes(logging.Handler):
     """Shows what the package logs."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        err.print("[yellow]note:[/]", end=" ")
-        err.print(record.getMessage(), markup=False, soft_wrap=True)
+        tell_note(record.getMessage())

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from stridecast.body import kinematics
 from stridecast.model.database import MotionDatabase
 from stridecast.model.pose import VehicleState
+from stridecast.model.segment import MOTIONS, RUN, STAND, WALK
 from stridecast.model.skeleton import Skeleton
 from stridecast.synthesis.walker import Walkers
 
@@ -18,6 +21,27 @@ POOL = 256
 
 LEVELS = 3
 """Who is far away is stepped at a half, or at a third of the frame rate."""
+
+RUNS_FROM = 1.8
+"""Slower than this also a runner walks, m/s."""
+
+
+def motions_of(
+    speeds: Float[Array, "*shape"], aims: Bool[Array, "*shape"], runs: Bool[Array, "*shape"]
+) -> Int[Array, "*shape"]:
+    """What bodies do, as numbers in ``MOTIONS``: who rests and does not aim at moving stands.
+
+    Parameters
+    ----------
+    speeds
+        Of their vehicles, m/s.
+    aims
+        Who is about to move, or moves and is not about to rest.
+    runs
+        Who runs where that is fast enough for it.
+    """
+    moving = np.where(runs & (speeds > RUNS_FROM), MOTIONS.index(RUN), MOTIONS.index(WALK))
+    return np.where((speeds == 0.0) & ~aims, MOTIONS.index(STAND), moving)
 
 
 class Bodies:
@@ -143,3 +167,11 @@ def stature(skeleton: Skeleton) -> float:
     ends = rest[skeleton.end_joints] + skeleton.end_offsets
     heights = np.concatenate((rest[:, 1], ends[:, 1])) if len(skeleton.end_joints) else rest[:, 1]
     return float(heights.max() - heights.min())
+
+
+def scaled_to(skeleton: Skeleton, height: float | None) -> Skeleton:
+    """A skeleton of another height, metres; as it is where nothing is said."""
+    if height is None:
+        return skeleton
+    scale = height / stature(skeleton)
+    return replace(skeleton, offsets=scale * skeleton.offsets, end_offsets=scale * skeleton.end_offsets)

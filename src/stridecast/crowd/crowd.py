@@ -11,20 +11,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from stridecast.crowd.bodies import LEVELS, Bodies
+from stridecast.crowd.bodies import LEVELS, Bodies, motions_of, scaled_to, stature
 from stridecast.crowd.bounds import HumanBounds
 from stridecast.crowd.explanation import Explanation, explanation_of
 from stridecast.crowd.ground import ground_of
 from stridecast.crowd.population import Due, Population
 from stridecast.crowd.routes import Routes
 from stridecast.crowd.state import make_limits
-from stridecast.crowd.traffic import Newcomer, Traffic
+from stridecast.crowd.step_kernels import propose
+from stridecast.crowd.traffic import ARRIVED, Newcomer, Traffic
 from stridecast.errors import InputError, PathError, SceneError
+from stridecast.geometry.kernels import is_compiled
 from stridecast.model.database import MotionDatabase
 from stridecast.model.people import Mover, Person
 from stridecast.model.pose import VehicleState
 from stridecast.model.scene import Scene
-from stridecast.model.segment import MOTIONS, RUN, STAND, WALK
+from stridecast.model.segment import RUN
 from stridecast.model.skeleton import Skeleton
 
 Array = np.ndarray
@@ -35,9 +37,6 @@ KEEPS = {"near": 0.1, "far": 0.35}
 
 BESIDE = 0.15
 """What people who walk together leave between them, metres."""
-
-RUNS_FROM = 1.8
-"""Slower than this also a runner walks, m/s."""
 
 SIDES = {"none": 0.0, "left": 1.0, "right": -1.0}
 
@@ -161,6 +160,8 @@ class Crowd:
         self.turned_away: tuple[Person, ...] = ()
         self._held_back: list[tuple[Due, int]] = []
         self._next: Due | None = next(self._coming, None)
+        if not propose.signatures and not is_compiled(propose):
+            log.warning("compiling the crowd, once for this machine and version: this takes a minute")
         self._movers = [self._add_mover(mover) for mover in scene.movers]
         self._let_in(progress)
 
@@ -171,10 +172,10 @@ class Crowd:
 
     @property
     def done(self) -> bool:
-        """Whether everybody who is to come has come and left; who stays for good does not count."""
+        """Whether everybody who is to come has come, and left; who stays for good has to stand at the last stop."""
         rows = self._rows
-        stays = self._traffic.people.stays[rows] | (self._traffic.people.points[rows] < 2)
-        return self._next is None and not self._held_back and bool(stays.all())
+        there = self._settled(rows) | (self._traffic.people.points[rows] < 2)
+        return self._next is None and not self._held_back and bool(there.all())
 
     @property
     def waiting(self) -> int:
@@ -221,6 +222,12 @@ class Crowd:
             movers=m.position[self._movers] if self._movers else np.zeros((0, 2)),
         )
 
+    def at_last_stop(self) -> frozenset[int]:
+        """Numbers of those who are there and have arrived, to leave or to stay."""
+        rows = self._rows
+        stay = rows[self._settled(rows)]
+        return frozenset(self._ids[np.concatenate((stay, self._traffic.arrived()))].tolist())
+
     def explain(self, who: int | str) -> Explanation:
         """What somebody is up to, and why.
 
@@ -254,11 +261,18 @@ class Crowd:
 
     def skeleton(self, number: int) -> Skeleton:
         """The skeleton of somebody, of their height."""
-        person, skeleton = self.person(number), self.database.skeleton
-        if person.height is None or self._bodies is None:
-            return skeleton
-        scale = person.height / self._bodies.height
-        return replace(skeleton, offsets=scale * skeleton.offsets, end_offsets=scale * skeleton.end_offsets)
+        return scaled_to(self.database.skeleton, self.person(number).height)
+
+    def height(self, number: int) -> float:
+        """Of somebody's body, metres."""
+        own = self.person(number).height
+        return stature(self.database.skeleton) if own is None else own
+
+    def _settled(self, rows: Int[Array, "rows"]) -> Bool[Array, "rows"]:
+        m, p = self._traffic.moving, self._traffic.people
+        to_go = self._traffic.ways.along[p.first[rows] + p.points[rows] - 1] - m.place[rows]
+        near = p.stays[rows] & (p.points[rows] >= 2) & (to_go < ARRIVED)
+        return near & (m.velocity[rows] == 0.0).all(axis=-1)
 
     def _name_of(self, row: int) -> str | None:
         if row < 0:
@@ -407,10 +421,7 @@ class Crowd:
             return
         speed = np.linalg.norm(m.velocity[rows], axis=-1)
         aims = (m.target[rows] != 0.0).any(axis=-1)
-        motions = np.where(
-            self._traffic.people.runs[rows] & (speed > RUNS_FROM), MOTIONS.index(RUN), MOTIONS.index(WALK)
-        )
-        motions = np.where((speed == 0.0) & ~aims, MOTIONS.index(STAND), motions)
+        motions = motions_of(speed, aims, self._traffic.people.runs[rows])
         levels = None
         if self.lod is not None and focus is not None:
             away = np.linalg.norm(m.position[rows] - np.asarray(focus, np.float64), axis=-1)

@@ -38,6 +38,9 @@ NEAR = 0.1
 COARSE = 0.02
 """What a source does beyond the bounds by less than this is not counted, metres (30 samples a second)."""
 
+SLACK = 1.15
+"""Nor what is beyond them by less than this factor: smoothing alone shifts accelerations by as much."""
+
 ROUNDS = 14
 """So often a reference is made stiffer where it asks for too much."""
 
@@ -153,10 +156,10 @@ def make_human(
         raise InputError(f"the frame rate must lie between 10 and 240 Hz, not at {frame_rate}")
     if noise is not None and not (np.isfinite(noise) and 0 <= noise <= 1):
         raise InputError(f"noise must lie between 0 and 1 m, not at {noise}")
-    stretches = _stretches(trajectories)
-    if not stretches:
+    present = stretches(trajectories)
+    if not present:
         return HumanTracks(frame_rate=frame_rate, tracks=())
-    references = [_reference(trajectories, rows, bounds, frame_rate, noise) for _, rows in stretches]
+    references = [_reference(trajectories, rows, bounds, frame_rate, noise) for _, rows in present]
     starts = np.concatenate(([0], np.cumsum([len(r.points) for r in references])))
     out = np.zeros((int(starts[-1]), 7))
     human_kernels.follow(
@@ -174,7 +177,7 @@ def make_human(
     )
     tracks = [
         _track(trajectories, person, rows, reference, out[first:last], bounds, frame_rate)
-        for (person, rows), reference, first, last in zip(stretches, references, starts[:-1], starts[1:], strict=True)
+        for (person, rows), reference, first, last in zip(present, references, starts[:-1], starts[1:], strict=True)
     ]
     return HumanTracks(frame_rate=frame_rate, tracks=tuple(tracks))
 
@@ -190,7 +193,7 @@ class _Reference:
     noise: float
 
 
-def _stretches(trajectories: Trajectories) -> list[tuple[int, slice]]:
+def stretches(trajectories: Trajectories) -> list[tuple[int, slice]]:
     """Rows in which a person is there all the time.
 
     Raises
@@ -341,9 +344,9 @@ def _beyond(
     most, low, high, wide = bounds.at(speed)
     found = (
         speed > bounds.fastest[-1],
-        (tangential > high) | (tangential < low),
-        np.abs(lateral) > wide + 0.1,
-        jerk > most,
+        (tangential > SLACK * high) | (tangential < SLACK * low),
+        (np.abs(lateral) > SLACK * wide + 0.1) & (speed > STRIDES),  # slower, people turn on the spot
+        jerk > SLACK * most,
     )
     at = np.clip(np.round(times * GRID).astype(np.int64), 0, len(grid) - 1)
     frames = np.minimum(np.searchsorted(moments, times), len(moments) - 1)

@@ -88,6 +88,33 @@ def write_parquet(path: str | Path, trajectories: Trajectories) -> None:
         parquet.write_table(table, file)
 
 
+def csv_to_parquet(source: str | Path, path: str | Path) -> None:
+    """Write a table of trajectories as Parquet, block by block, so that it may be larger than the memory."""
+    parquet = _pyarrow(path)
+    import pyarrow as pa
+    from pyarrow import csv as arrow_csv
+
+    kinds = {name: pa.int64() if name == "id" else pa.float64() for name in COLUMNS}
+    with (
+        arrow_csv.open_csv(source, convert_options=arrow_csv.ConvertOptions(column_types=kinds)) as table,
+        replacing(path) as file,
+        parquet.ParquetWriter(file, table.schema) as out,
+    ):
+        for block in table:
+            out.write_batch(block)
+
+
+def check_parquet(path: str | Path) -> None:
+    """Raise the error that writing Parquet would raise where its library is missing.
+
+    Raises
+    ------
+    FileError
+        It is missing.
+    """
+    _pyarrow(path)
+
+
 def trajectories_of(data: Any, name: str = "") -> Trajectories:
     """Trajectories of an object such as PedPy's ``TrajectoryData``.
 
