@@ -233,8 +233,8 @@ def main() -> int:
             left = (time.perf_counter() - begun) / len(rows) * (len(todo) - len(rows))
             told = row.get("error") or (f"{row['left_over']} left" if row["left_over"] and task.density is None else "")
             if told or sys.stderr.isatty() or len(rows) % max(len(todo) // 20, 1) == 0:
-                what = f"{len(rows)} of {len(todo)}, about {left:.0f} s more; {task.title}, seed {task.seed}: {told or 'done'}"
-                print(what, file=sys.stderr, flush=True)
+                what = f"{task.title}, seed {task.seed}: {told or 'done'}"
+                print(f"{len(rows)} of {len(todo)}, about {left:.0f} s more; {what}", file=sys.stderr, flush=True)
     sums = [
         together([rows[t] for t in todo if t.title == title]) for title in dict.fromkeys(task.title for task in todo)
     ]
