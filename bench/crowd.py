@@ -19,16 +19,25 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import peers
 import shapely
 
+import peers
 import stridecast as sc
+from stridecast.crowd.bounds import HumanBounds
+from stridecast.crowd.crowd import Crowd
+from stridecast.crowd.population import Population, task_of
 from stridecast.model.scene import Circle, Scene
+from stridecast.model.trajectories import Trajectories
+from stridecast.paths.generate import generate_path
+from stridecast.samples.situations import SITUATIONS, situation
 from stridecast.scorecard.crowds import CrowdScore, score_crowd
 from stridecast.scorecard.travel import REACH
 
 RATE = 30.0
 """At which all are sampled, Hz."""
+
+LONGEST = 120.0
+"""A scene that says nothing else lasts so long, seconds."""
 
 RESOLUTION = 1e-5
 """RVO2 computes in single precision: its places are as if rounded to so many metres."""
@@ -39,8 +48,6 @@ Runner = Callable[[Scene, int], peers.Simulated]
 
 def plain(scene: Scene, seed: int) -> Plain:
     """A scene as plain numbers, everybody who is there at the beginning with the points they go to."""
-    from stridecast.crowd.population import Population
-
     people = [p for due in Population(scene, seed=seed, frame_rate=RATE).until(0.0) for p in due.people]
     return {
         "people": [
@@ -56,15 +63,12 @@ def plain(scene: Scene, seed: int) -> Plain:
         "walls": [wall.points.tolist() for wall in scene.walls],
         "circles": [[*o.center.tolist(), o.radius] for o in scene.obstacles if isinstance(o, Circle)],
         "polygons": [o.points.tolist() for o in scene.obstacles if not isinstance(o, Circle)],
-        "seconds": scene.seconds or 120.0,
+        "seconds": scene.seconds or LONGEST,
     }
 
 
 def way(scene: Scene, person: Any) -> float | None:
     """Length of the planned way of somebody alone who cannot go straight, metres; nothing for all others."""
-    from stridecast.crowd.population import task_of
-    from stridecast.paths.generate import generate_path
-
     walls = [shapely.LineString(wall.points) for wall in scene.walls]
     solid = shapely.union_all([*walls, *(shapely.Polygon(o.points) for o in scene.obstacles if hasattr(o, "points"))])
     straight = shapely.LineString(np.concatenate((person.start[None], *person.stops)))
@@ -76,9 +80,26 @@ def peer(name: str, scene: Scene, seed: int) -> peers.Simulated:
     return peers.simulate(name, plain(scene, seed), RATE)
 
 
-def runners() -> dict[str, Runner]:
+def ours(database: sc.MotionDatabase, scene: Scene, seed: int) -> peers.Simulated:
+    """How our crowd walks a scene: vehicles without bodies, as the peers'."""
+    crowd = Crowd(database, scene, seed=seed, bodies=False, frame_rate=RATE)
+    frames = [crowd.frame()]
+    begun = time.perf_counter()
+    while not crowd.done and crowd.time < (scene.seconds or LONGEST):
+        frames.append(crowd.step())
+    seconds = time.perf_counter() - begun
+    ids = np.concatenate([frame.ids for frame in frames])
+    times = np.concatenate([np.full(len(frame.ids), frame.time) for frame in frames])
+    positions = np.concatenate([frame.positions for frame in frames])
+    order = np.lexsort((times, ids))
+    # numbers begin at 1, in the order in which people come
+    walked = Trajectories(ids=ids[order] - 1, times=times[order], positions=positions[order], name="ours")
+    return peers.Simulated(walked, seconds)
+
+
+def runners(database: sc.MotionDatabase) -> dict[str, Runner]:
     """Everybody who can walk a scene here, by name."""
-    found: dict[str, Runner] = {}
+    found: dict[str, Runner] = {"ours": partial(ours, database)}
     if peers.are_installed():
         found |= {name: partial(peer, name) for name in peers.PEERS}
     else:
@@ -107,7 +128,7 @@ COLUMNS: dict[str, Callable[[CrowdScore], str]] = {
     "overlaps": lambda s: f"{s.overlaps.pairs}",
     "cm": lambda s: f"{100 * s.overlaps.depth:.0f}",
     "walls": lambda s: f"{s.solid_overlaps.pairs}",
-    "stuck": lambda s: f"{len(s.deadlocks)}",
+    "stuck": lambda s: f"{len({d.person for d in s.deadlocks})}",
     "time": lambda s: _median(s.travel.against_alone),
     "way": lambda s: _median(s.travel.detours),
     "Weidm.": lambda s: f"{s.speed_density.deviation:.2f}",
@@ -118,8 +139,9 @@ COLUMNS: dict[str, Callable[[CrowdScore], str]] = {
         for kind in ("speed", "tangential", "lateral", "jerk")
     },
 }
-"""Of each run: who arrives; pairs that overlap and how deep; pairs with walls; deadlocks; time and way against alone;
-distance to Weidmann (m/s); acceleration (m/s2); root of the mean squared jerk (m/s3); samples beyond human bounds."""
+"""Of each run: who arrives; pairs that overlap and how deep; pairs with walls; people in deadlocks; time and way
+against alone; distance to Weidmann (m/s); acceleration (m/s2); root of the mean squared jerk (m/s3); samples beyond
+human bounds."""
 
 
 def _median(values: np.ndarray) -> str:
@@ -161,9 +183,6 @@ def draw(folder: Path, name: str, walked: peers.Simulated, situation: Plain) -> 
 
 def main() -> int:
     """Let everybody walk everything, and print."""
-    from stridecast.crowd.bounds import HumanBounds
-    from stridecast.samples.situations import SITUATIONS, situation
-
     usual = [name for name in SITUATIONS if name != "ring"]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--situations", default=",".join(usual), help=f"of {', '.join(SITUATIONS)}")
@@ -172,9 +191,11 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="writes all measures")
     parser.add_argument("--pictures", type=Path, help="draws all ways into this folder")
     wish = parser.parse_args()
-    bounds = HumanBounds.of(sc.load_database(wish.database) if wish.database else sc.sample_database())
+    database = sc.load_database(wish.database) if wish.database else sc.sample_database()
+    bounds = HumanBounds.of(database)
     content = []
-    everybody = runners()
+    everybody = runners(database)
+    ours(database, situation("head_on"), 0)  # compiles, which is no time of walking
     for name in wish.situations.split(","):
         for seed in range(wish.seeds):
             scene = situation(name, seed)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import jupedsim as jps
 import numpy as np
 import shapely
+
 from peer_common import PASSED, REACH, main, solid
 
 SUBSTEPS = {"CollisionFreeSpeedModel": 4, "SocialForceModel": 4}
@@ -40,7 +43,7 @@ def simulate(situation, frame_rate, arguments, note) -> None:
         stages = [sim.add_waypoint_stage(tuple(stop), PASSED) for stop in stops[:-1]]
         stages.append(sim.add_waypoint_stage(tuple(stops[-1]), REACH))
         journey = jps.JourneyDescription(stages)
-        for one, other in zip(stages[:-1], stages[1:], strict=True):
+        for one, other in pairwise(stages):
             journey.set_transition_for_stage(one, jps.Transition.create_fixed_transition(other))
         agent = sim.add_agent(
             parameters(

@@ -6,11 +6,14 @@ points beside the corners of what is solid.
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pyrvo
 import shapely
-from peer_common import PASSED, REACH, main, solid
 from scipy.sparse.csgraph import dijkstra
+
+from peer_common import PASSED, REACH, main, solid
 
 NEIGHBORS, HORIZON, SOLID_HORIZON, SIGHT = 10, 5.0, 1.0, 10.0
 """Of how many, how many seconds ahead, the same of what is solid, and within how many metres."""
@@ -62,7 +65,7 @@ def simulate(situation, frame_rate, _arguments, note) -> None:
             tuple(p["start"]), SIGHT, NEIGHBORS, HORIZON, SOLID_HORIZON, p["radius"], FASTER * p["speed"], (0.0, 0.0)
         )
     for wall in situation["walls"]:
-        for one, other in zip(wall[:-1], wall[1:], strict=True):
+        for one, other in pairwise(wall):
             sim.add_obstacle([tuple(one), tuple(other)])
     for polygon in situation["polygons"]:
         sim.add_obstacle(anticlockwise(shapely.Polygon(polygon)))

@@ -123,6 +123,23 @@ def test_straight_leg_bends_its_knee_forward(side):
     assert (at[:, knee, 2] > at[:, hip, 2] + 0.1).all()
 
 
+@given(SEEDS, SIDES, st.floats(-0.15, 0.02))
+def test_knee_that_goes_backwards_bends_forward(seed, side, knee):
+    """However it got there: mixing poses may do that."""
+    motion = bending(seed=seed)
+    skeleton, shin = motion.skeleton, motion.skeleton.joint(f"{side}_shin")
+    rotations = motion.rotations.copy()
+    rotations[:, shin] = quat.exp(np.array([knee, 0.0, 0.0]))
+    motion = replace(motion, rotations=rotations)
+    ankles = goals(motion, side, seed)
+    rotations = reach(skeleton, motion.root_positions, rotations, side, ankles)
+    found = kinematics.forward(skeleton, motion.root_positions, rotations).positions[:, skeleton.joint(f"{side}_foot")]
+    np.testing.assert_allclose(found, ankles, atol=1e-9)
+    bend = quat.log(rotations[:, shin])
+    assert (bend[:, 0] > 0).all()
+    np.testing.assert_allclose(bend[:, 1:], 0.0, atol=1e-7)
+
+
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_leg_folds_no_further_than_its_bones_allow(side):
     motion = bending(seed=3)

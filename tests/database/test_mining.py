@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import stridecast as sc
 from databases import swapped
-from stridecast.analysis.take import analyse
+from stridecast.analysis.take import SOLE, analyse
 from stridecast.body import kinematics
 from stridecast.database.clips import COLUMNS, Clips, find_clips
 from stridecast.database.mining import HARDEST_GAIN, MOST_GAIN, MOST_GAP, TOLERANCES, Mined, mine
@@ -178,17 +178,20 @@ def test_an_exact_hit_comes_back_as_recorded(learned, sources, data):
 
 
 @FEW
-@given(MOVING, st.floats(0, 1))
-def test_feet_stay_where_they_stand(learned, kind, share):
-    mined = mine(learned, **wishes(*kind, share), cycles=3)
-    positions = kinematics.pose(mined.motion).positions
+@given(MOVING, st.floats(0, 1), st.one_of(st.none(), st.floats(-0.3, 0.3)))
+def test_feet_stay_where_they_stand(learned, kind, share, turn):
+    """All the time they stand, knees bend forward, and no toe goes through the floor."""
+    mined = mine(learned, **wishes(*kind, share), turn=turn, cycles=3)
+    motion = mined.motion
+    positions = kinematics.pose(motion).positions
     for side, name in enumerate(SIDES):
-        toe = ground.project(positions[:, mined.motion.skeleton.joint(f"{name}_toe")])
+        toe = positions[:, motion.skeleton.joint(f"{name}_toe")]
+        assert toe[:, 1].min() > 0.95 * SOLE * motion.skeleton.leg_length
+        assert quat.log(motion.rotations[:, motion.skeleton.joint(f"{name}_shin")])[:, 0].min() > 0
         for planted, start, stop in signals.runs(mined.planted[:, side]):
-            rest = (stop - start) // 4
-            if planted and start > 0 and stop < mined.motion.frames and stop - start > 2 * rest + 1:
-                held = toe[start + rest : stop - rest]
-                assert np.linalg.norm(held - held.mean(axis=0), axis=-1).max() < 0.006
+            if planted:
+                held = ground.project(toe[start:stop])
+                assert np.linalg.norm(held - held.mean(axis=0), axis=-1).max() < 0.003
 
 
 @pytest.fixture(scope="module")
@@ -202,13 +205,14 @@ def farthest(sources) -> dict[str, float]:
 
 
 @FEW
+@example(("run", 2.6, 3.5), 0.415, -0.02)  # one recorded cycle, of somebody who still gains speed
 @given(MOVING, st.floats(0, 1), st.floats(-0.3, 0.3))
 def test_no_limb_goes_beyond_what_was_recorded(learned, farthest, kind, share, turn):
-    """But for what holding a foot bends a knee: in short contacts of formula runs up to 8 degrees."""
+    """But for what holding a foot bends a knee, and what closing a cycle swings a limb."""
     mined = mine(learned, **wishes(*kind, share), turn=turn, cycles=2)
     for joint, most in farthest.items():
         bent = angle(mined.motion.rotations[:, mined.motion.skeleton.joint(joint)], quat.IDENTITY)
-        assert bent.max() < most + np.radians(10 if kind[0] == "run" else 5)
+        assert bent.max() < most + np.radians(5)
 
 
 def test_the_same_question_has_the_same_answer(learned):
@@ -283,6 +287,7 @@ def test_transitions_come_from_end_to_end(learned):
     assert speeds[0] < 0.3
     assert speeds[-4:].mean() == pytest.approx(start.speed, abs=0.3)
     stop = mine(learned, status="walk-stand")
+    assert stop.planted[-1].any()
     way = ground.project(stop.motion.root_positions)
     assert np.linalg.norm(way[-1] - way[-2]) * stop.motion.frame_rate < 0.3
 
@@ -388,11 +393,14 @@ def test_mining_is_public(learned):
     assert sc.Mined is Mined
 
 
-def test_real_walkers_are_mined_without_sliding(small_database):
-    mined = mine(small_database, status="walk", speed=1.15, cycles=4)
+@pytest.mark.parametrize(
+    "wish", [{"status": "walk", "speed": 1.15}, {"status": "run"}, {"status": "walk", "turn": 0.3}]
+)
+def test_real_people_are_mined_without_sliding(small_database, wish):
+    mined = mine(small_database, **wish, cycles=4)
     positions = kinematics.pose(mined.motion).positions
-    toe = ground.project(positions[:, mined.motion.skeleton.joint("left_toe")])
-    for planted, start, stop in signals.runs(mined.planted[:, 0]):
-        if planted and start > 0 and stop < mined.motion.frames:
-            held = toe[start + (stop - start) // 4 : stop - (stop - start) // 4]
-            assert np.linalg.norm(held - held.mean(axis=0), axis=-1).max() < 0.004
+    for side, name in enumerate(SIDES):
+        toe = ground.project(positions[:, mined.motion.skeleton.joint(f"{name}_toe")])
+        for planted, start, stop in signals.runs(mined.planted[:, side]):
+            if planted:
+                assert np.linalg.norm(toe[start:stop] - toe[start:stop].mean(axis=0), axis=-1).max() < 0.004

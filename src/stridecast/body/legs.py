@@ -7,10 +7,14 @@ from jaxtyping import Float
 
 from stridecast.body import kinematics
 from stridecast.geometry import quaternions as quat
+from stridecast.geometry import signals
 from stridecast.model.skeleton import Skeleton
 
 STRAIGHTEST = 0.9995
 """Largest reach of a leg, as a part of its length: a leg pulled quite straight snaps when the hip moves on."""
+
+BENT = 0.05
+"""A knee that is bent forward by less than this (its sine) has no plane to keep."""
 
 
 def reach(
@@ -22,7 +26,8 @@ def reach(
 ) -> Float[np.ndarray, "frames joints 4"]:
     """Bend one leg so that its ankle comes to ``ankles``; the foot keeps its world rotation.
 
-    The knee keeps the plane it has; a leg that is too short reaches as far as it can.
+    The knee keeps the plane it has; one that is straight, or goes backwards, bends about its hinge, forwards. A leg
+    that is too short reaches as far as it can.
 
     Parameters
     ----------
@@ -42,13 +47,15 @@ def reach(
     # 1. Bend the knee until the distance from hip to ankle is right.
     want = np.linalg.norm(ankles - hip, axis=-1)
     want = np.clip(want, abs(upper - lower) * 1.001, (upper + lower) * STRAIGHTEST)
-    have = np.linalg.norm(ankle - hip, axis=-1)
-    axis = np.cross(knee - hip, ankle - knee)
-    straight = np.linalg.norm(axis, axis=-1) < 1e-4 * upper * lower
+    thigh_way, shin_way = (knee - hip) / upper, (ankle - knee) / lower
+    axis = np.cross(thigh_way, shin_way)
     hinge = quat.rotate(world.rotations[:, shin], np.array([1.0, 0.0, 0.0]))
-    axis = np.where(straight[:, None], hinge, axis)
+    forward = signals.smooth(np.sum(axis * hinge, axis=-1, keepdims=True) / BENT)
+    hinge -= np.sum(hinge * thigh_way, axis=-1, keepdims=True) * thigh_way
+    axis = forward * axis + (1 - forward) * BENT * hinge
     axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
-    bend = quat.exp(axis * (_inner_angle(upper, lower, have) - _inner_angle(upper, lower, want))[:, None])
+    bend = quat.exp(axis * (np.pi - _inner_angle(upper, lower, want))[:, None])
+    bend = quat.multiply(bend, quat.between(shin_way, thigh_way))
     ankle = knee + quat.rotate(bend, ankle - knee)
 
     # 2. Swing the whole leg so that the ankle points at its place. Bones between the three joints follow rigidly.

@@ -30,6 +30,9 @@ FARTHEST_REACH = 0.9995
 SINKING = 0.05
 """Sinking is smoothed over this time, seconds."""
 
+TIP = 0.004
+"""The tips of the toes stay above this height, metres."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Feet:
@@ -46,6 +49,30 @@ def feet_of(motion: Motion) -> Feet:
         toes=world.positions[:, motion.skeleton.chain("left_toe", "right_toe")],
         turns=world.rotations[:, motion.skeleton.chain("left_foot", "right_foot")],
     )
+
+
+def standing(free: Feet, planted: Bool[Array, "frames 2"]) -> Feet:
+    """Feet that stay over the same place while planted, that of the middle half of each stance; heights and turns stay.
+
+    Parameters
+    ----------
+    free
+        Where feet would be.
+    planted
+        Which foot stands when.
+    """
+    toes = free.toes.copy()
+    for side in range(2):
+        for stands, start, stop in signals.runs(planted[:, side]):
+            if stands:
+                rest = (stop - start) // 4
+                toes[start:stop, side, ::2] = free.toes[start + rest : stop - rest, side, ::2].mean(axis=0)
+    return replace(free, toes=toes)
+
+
+def raised(feet: Feet, height: float) -> Feet:
+    """Feet whose toe joints are at least so high."""
+    return replace(feet, toes=np.maximum(feet.toes, [-np.inf, height, -np.inf]))
 
 
 def corrected(free: Feet, wanted: Feet, planted: Bool[Array, "frames 2"], rate: float) -> Feet:
@@ -128,6 +155,23 @@ def put_feet(
         )
         rotations = reach(skeleton, root, rotations, name, goal)
     return replace(motion, root_positions=root, rotations=quat.continuous(quat.normalize(rotations)))
+
+
+def with_toes_up(motion: Motion) -> Motion:
+    """The same motion with toes bent up where their tips would go through the floor."""
+    skeleton, rotations = motion.skeleton, motion.rotations.copy()
+    world = kinematics.pose(motion)
+    for toe in skeleton.chain("left_toe", "right_toe"):
+        for end in skeleton.end_offsets[skeleton.end_joints == toe][:1]:
+            tip = quat.rotate(world.rotations[:, toe], end)
+            level = np.maximum(np.hypot(tip[:, 0], tip[:, 2]), 1e-9)
+            length = np.maximum(np.linalg.norm(tip, axis=-1), 1e-9)
+            want = np.arcsin(np.clip((TIP - world.positions[:, toe, 1]) / length, -1.0, 1.0))
+            lift = np.maximum(want - np.arctan2(tip[:, 1], level), 0.0)
+            axis = np.stack((-tip[:, 2] / level, np.zeros(len(tip)), tip[:, 0] / level), axis=-1)
+            raised = quat.multiply(quat.exp(axis * lift[:, None]), world.rotations[:, toe])
+            rotations[:, toe] = quat.multiply(quat.inverse(world.rotations[:, skeleton.parents[toe]]), raised)
+    return replace(motion, rotations=rotations)
 
 
 def _leg(skeleton: Skeleton, world: kinematics.World, name: str) -> tuple[Array, Array, float]:

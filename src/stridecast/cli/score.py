@@ -45,7 +45,7 @@ def score(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON.")] = False,
 ) -> None:
-    """Measure trajectories of crowds (overlaps, deadlocks, times, ways, smoothness) or motions of bodies (feet, knees)."""
+    """Measure trajectories of crowds (overlaps, deadlocks, times, ways) or motions of bodies (feet, knees)."""
     from stridecast.cli import screen
     from stridecast.formats.recordings import RECORDINGS, load_motion
     from stridecast.scorecard.motion import score_motion
@@ -153,15 +153,18 @@ def _crowd_table(path: Path, score: CrowdScore) -> Table:
         "people", f"{score.people} for {score.seconds:.1f} s at {score.frame_rate:.4g} Hz ({score.samples} samples)"
     )
     for name, found in (("overlaps", score.overlaps), ("overlaps with the scene", score.solid_overlaps)):
-        text = f"{found.pairs} pairs in {found.frames} frames"
+        text = f"pairs: {found.pairs}, in {found.frames} frames"
         worst = [f"{o.one} and {o.other} {100 * o.depth:.1f} cm at {o.time:.2f} s" for o in found.each[:WORST_SHOWN]]
         table.add_row(name, escape("none" if not found.pairs else f"{text}; deepest {', '.join(worst)}"))
     stuck = [f"{d.person} from {d.first:.1f} to {d.last:.1f} s" for d in score.deadlocks[:WORST_SHOWN]]
     ended = sum(d.resolved for d in score.deadlocks)
-    groups = f", {len(score.blocking_groups)} groups block each other" if score.blocking_groups else ""
+    groups = ", some block each other" if score.blocking_groups else ""
     table.add_row(
         "deadlocks",
-        f"{len(score.deadlocks)} ({ended} resolved{groups}): {', '.join(stuck)}" if stuck else "none",
+        f"{len({d.person for d in score.deadlocks})} people, {len(score.deadlocks)} stands ({ended} resolved{groups}): "
+        f"{', '.join(stuck)}"
+        if stuck
+        else "none",
     )
     goals = int(way.has_goal.sum())
     table.add_row("arrived", f"{way.arrived} of {goals}" if goals else "no goals known")

@@ -22,10 +22,12 @@ ANGLES = np.radians(
 )
 """Directions looked at, from the wished one."""
 
-SHARES = np.array([1.0, 0.7, 0.4, 0.15])
-"""Shares of the speed that is possible in a direction; standing is looked at besides."""
+SINES, COSINES = np.sin(ANGLES), np.cos(ANGLES)
 
-CHOICES = len(ANGLES) * len(SHARES) + 1
+SHARES = np.array([1.0, 0.7, 0.4, 0.15])
+"""Shares of the speed that is possible in a direction. The present direction and standing are looked at besides."""
+
+CHOICES = (len(ANGLES) + 1) * len(SHARES) + 1
 
 HURRY = 1.15
 """Who goes first may hurry by this factor."""
@@ -54,6 +56,12 @@ HEADWAY = 0.9
 JAM = 0.12
 """Nearer than this nobody follows, metres."""
 
+FREE = 6.0
+"""Who is further ahead does not matter, metres."""
+
+GENTLY = 0.8
+"""Up to who does not go the same way people go so fast that they can stop as gently as this, m/s2."""
+
 LEAD = 0.4
 """Who goes on in front makes so much room, seconds of their speed."""
 
@@ -69,7 +77,7 @@ KEEP = 0.3
 MANY = 6
 """So many are many."""
 
-JAM_LEFT_ALONE = 0.7
+JAM_LEFT_ALONE = 0.35
 """The same of people who block each other: they need the room, metres."""
 
 TURN = 0.15
@@ -78,7 +86,7 @@ TURN = 0.15
 SIDE = 0.35
 """Price of the wrong side."""
 
-CHANGE = 0.12
+CHANGE = 0.2
 """Price of changing one's mind."""
 
 
@@ -123,22 +131,34 @@ def weigh(
     still = aim > 0.0 and math.hypot(moving.velocity[c, 0], moving.velocity[c, 1]) < 0.3
     radius, keep = people.radius[c], min(people.keep[c], 0.5)
     n = 0
-    for a in range(len(ANGLES)):
-        sine, cosine = math.sin(ANGLES[a]), math.cos(ANGLES[a])
-        ax, az = dx * cosine + dz * sine, dz * cosine - dx * sine  # turned to the left by the angle
+    for a in range(len(ANGLES) + 1):
+        if a < len(ANGLES):
+            sine, cosine = SINES[a], COSINES[a]
+            ax, az = dx * cosine + dz * sine, dz * cosine - dx * sine  # turned to the left by the angle
+        elif aim > 0.0:
+            ax, az = moving.target[c, 0] / aim, moving.target[c, 1] / aim
+            sine, cosine = ax * dz - az * dx, ax * dx + az * dz
+        else:
+            ax, az, sine, cosine = dx, dz, 0.0, 1.0
         wall = free_way(ground, things, standing, x, z, ax, az, radius, 4.0)
-        ahead = 6.0 + JAM
+        top = min(fastest, most)
         for m in range(count):
             o = seen[m]
-            # One follows whom one has in front, not who stands beside or comes towards one.
-            in_front = o[PX] * ax + o[PZ] * az > IN_FRONT * math.hypot(o[PX], o[PZ])
-            if in_front and o[VX] * ax + o[VZ] * az > -0.2:
+            along = o[PX] * ax + o[PZ] * az
+            if along <= 0.0 or o[VX] * ax + o[VZ] * az < -0.2:
+                continue  # behind, or coming towards one: that is no one to follow
+            gap = disc_way(o[PX], o[PZ], ax, az, radius + o[RADIUS], FREE)
+            if gap >= FREE:
+                continue
+            if o[HX] * ax + o[HZ] * az > 0.0 and along > IN_FRONT * math.hypot(o[PX], o[PZ]):
+                # One follows whom one has in front and who goes the same way.
                 reserve = JAM_LEFT_ALONE if o[JAMMED] > 0.0 and not out else JAM
-                pace = LEAD * max(o[VX] * ax + o[VZ] * az, 0.0)
-                ahead = min(ahead, disc_way(o[PX], o[PZ], ax, az, radius + o[RADIUS], 10.0) - reserve + pace)
-        top = min(fastest * (1.0 - math.exp(-max(ahead, 0.0) / HEADWAY)), fastest, most)
+                gap += LEAD * max(o[VX] * ax + o[VZ] * az, 0.0) - reserve
+                top = min(top, fastest * (1.0 - math.exp(-max(gap, 0.0) / HEADWAY)))
+            else:
+                top = min(top, math.sqrt(2.0 * GENTLY * gap))
         wrong = (1.0 - abs(drift)) * SIDE * max(-side * sine, 0.0) - KEEP * drift * sine
-        if side != 0.0 and ANGLES[a] == 0.0:
+        if side != 0.0 and a == 0:
             wrong = 0.25 * (1.0 - abs(drift)) * SIDE
         if still:
             wrong += TURN * (1.0 - (ax * moving.target[c, 0] + az * moving.target[c, 1]) / aim)
@@ -190,7 +210,7 @@ def people_in_the_way(
         if closing <= 0.0:
             continue
         price = danger(contact_time(o[PX], o[PZ], ux - o[EX], uz - o[EZ], min(bodies + keep, max(gap - 0.01, bodies))))
-        price *= min(closing / GENTLE, 1.0)
+        price *= min(closing / GENTLE, 1.0) ** 2
         if o[FELLOW] > 0.0:
             price *= 0.3
         if int(o[ROW]) == yields:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +28,7 @@ from stridecast.model.segment import MOTIONS, RUN, STAND, WALK
 from stridecast.model.skeleton import Skeleton
 
 Array = np.ndarray
+log = logging.getLogger("stridecast")
 
 KEEPS = {"near": 0.1, "far": 0.35}
 """What is kept from others beyond the bodies where there is room, by preference, metres."""
@@ -156,6 +158,7 @@ class Crowd:
         self._count = 0
         self.came: list[Person] = []
         self.left: list[tuple[int, float]] = []
+        self.turned_away: tuple[Person, ...] = ()
         self._held_back: list[tuple[Due, int]] = []
         self._next: Due | None = next(self._coming, None)
         self._movers = [self._add_mover(mover) for mover in scene.movers]
@@ -234,11 +237,10 @@ class Crowd:
         row = self._row_of(who)
         m = self._traffic.moving
         other = int(m.other[row])
-        known = self._people.get(other)
         return explanation_of(
             self._people[row].name,
             int(m.rule[row]),
-            None if other < 0 else known.name if known is not None else "an obstacle that moves",
+            self._name_of(other),
             float(m.contact[row]),
             float(m.chosen_side[row]),
             bool(m.held[row]),
@@ -257,6 +259,13 @@ class Crowd:
             return skeleton
         scale = person.height / self._bodies.height
         return replace(skeleton, offsets=scale * skeleton.offsets, end_offsets=scale * skeleton.end_offsets)
+
+    def _name_of(self, row: int) -> str | None:
+        if row < 0:
+            return None
+        if self._traffic.people.scripted[row]:
+            return self.scene.movers[self._movers.index(row)].name
+        return self._people[row].name
 
     def _row_of(self, who: int | str) -> int:
         for row in self._rows.tolist():
@@ -282,7 +291,16 @@ class Crowd:
         done = 0
         full: set[str | None] = set()
         for item, attempt in due:
-            if (item.source is not None and item.source in full) or not self._enter(item, attempt):
+            waits = item.source is not None and item.source in full
+            try:
+                waits = waits or not self._enter(item, attempt)
+            except (SceneError, PathError) as error:
+                if self._traffic.frame == 0:
+                    raise
+                # In mid-shot somebody who has no way stays out; everybody else goes on.
+                log.warning("somebody stays out: %s", error)
+                self.turned_away += item.people
+            if waits:
                 full.add(item.source)
                 self._held_back.append((item, attempt + 1))
             done += len(item.people)
@@ -296,17 +314,14 @@ class Crowd:
         group = self._population.place(due, discs, attempt=attempt)
         if group is None:
             return False
-        lead, slots = self._ways(group), _slots(group)
-        news = []
-        for person, way, slot in zip(group, lead, slots, strict=True):
-            new = self._newcomer(person, way, slot)
-            if not self._traffic.has_room(new):
-                new = replace(new, speed=0.0)
-                if not self._traffic.has_room(new):
-                    return False
-            news.append(new)
-        at = self._traffic.add(news)
-        if len(self._ids) < len(m.here) or len(self._ids) < len(self._traffic.moving.here):
+        slots = _slots(group)
+        news = [self._newcomer(*each) for each in zip(group, self._ways(group), slots, strict=True)]
+        at = self._add_together(news)
+        if at is None:
+            at = self._add_together([replace(new, speed=0.0) for new in news])
+        if at is None:
+            return False
+        if len(self._ids) < len(self._traffic.moving.here):
             grown = np.zeros(len(self._traffic.moving.here), np.int64)
             grown[: len(self._ids)] = self._ids
             self._ids = grown
@@ -326,6 +341,16 @@ class Crowd:
             )
         return True
 
+    def _add_together(self, news: Sequence[Newcomer]) -> Int[Array, "rows"] | None:
+        """Let people appear if there is room for all of them; their rows."""
+        rows: list[int] = []
+        for new in news:
+            if not self._traffic.has_room(new):
+                self._traffic.remove(np.array(rows, np.int64))
+                return None
+            rows += self._traffic.add([new]).tolist()
+        return np.array(rows, np.int64)
+
     def _ways(self, group: tuple[Person, ...]) -> list[Array]:
         """Who walks together goes the way of the first of them, each with an own beginning."""
         ways: list[Array] = []
@@ -341,7 +366,7 @@ class Crowd:
         b = person.behavior
         heading = person.heading
         if heading is None:
-            ahead = way[min(4, len(way) - 1)] - person.start
+            ahead = way[min(4, len(way) - 1)] - way[0]  # people who walk together all look the same way
             heading = math.atan2(*ahead) if len(way) > 1 and np.hypot(*ahead) > 1e-6 else 0.0
         fastest = self.bounds.fastest[-1 if b.status == RUN else 0]
         return Newcomer(

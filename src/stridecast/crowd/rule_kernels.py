@@ -111,7 +111,7 @@ def answer(
     moves = math.hypot(ex, ez) > STANDS
     between = abs(math.atan2(ex * dz - ez * dx, ex * dx + ez * dz))
     junior = people.rank[c] < o[RANK]
-    if moving.since[c] > PERSISTS_LONGER and soonest < CLOSE and junior and waits:
+    if moves and moving.since[c] > PERSISTS_LONGER and soonest < CLOSE and junior and waits:
         return WAIT, j, soonest, 0.0, 0.0
     side = people.side[c]
     if side == 0.0:  # the nearer one, else the right

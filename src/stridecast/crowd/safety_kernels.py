@@ -40,15 +40,18 @@ def apart(one: np.ndarray, n: int, other: np.ndarray, m: int, shift: int, least:
 
 
 @kernel
-def clear_of_ground(ground: Ground, things: np.ndarray, count: int, path: np.ndarray, n: int, radius: float) -> bool:
-    """Whether a commitment keeps clear of what stands; who is too near already comes no nearer."""
+def clear_of_ground(
+    ground: Ground, things: np.ndarray, count: int, x: float, z: float, path: np.ndarray, n: int, radius: float
+) -> bool:
+    """Whether a commitment keeps clear of what stands; who is too near now, at ``(x, z)``, comes no nearer."""
     far = 1.05 * math.hypot(path[n - 1, 0] - path[0, 0], path[n - 1, 1] - path[0, 1])
+    far += math.hypot(path[0, 0] - x, path[0, 1] - z)
     for m in range(count):
-        now = room(ground, things[m], path[0, 0], path[0, 1])
+        now = room(ground, things[m], x, z)
         if now > far + radius + HAIR:
             continue
         least = min(radius + HAIR, now)
-        for k in range(1, n):
+        for k in range(n):
             if room(ground, things[m], path[k, 0], path[k, 1]) < least:
                 return False
     return True

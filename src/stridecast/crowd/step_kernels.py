@@ -14,7 +14,15 @@ from stridecast.crowd.rules import GIVE_WAY, HELD, ON_THE_WAY, RETURN, STAND, WA
 from stridecast.crowd.safety_kernels import HAIR, apart, clear_of_ground
 from stridecast.crowd.state import Cells, Ground, Limits, Moving, People, Scratch, Ways
 from stridecast.crowd.vehicle_kernels import REST, advance, stop
-from stridecast.crowd.way_kernels import company_pace, find_place, place_at, wanted, way_out
+from stridecast.crowd.way_kernels import (
+    company_pace,
+    find_place,
+    place_at,
+    room_in,
+    round_the_jam,
+    wanted,
+    way_out,
+)
 from stridecast.geometry.kernels import kernel
 
 SIGHT = 16.0
@@ -45,18 +53,17 @@ PATIENCE = 1.5
 STUCK = 0.7
 """Who has not got on for so long and is blocked by somebody who wants to go elsewhere is in a jam, seconds."""
 
-ROOM = 0.5
-"""Behind people who block each other everybody steps back until there is so much room, metres ..."""
+ROOM = 0.4
+"""Behind people who block each other there should be so much room, metres ..."""
 
-STEP_BACK = 0.6
-"""... for so long at a time, seconds."""
+STEPPING_BACK, STEP_BACK = 0.6, 1.5
+"""... so this part of those who have less step back, for so long (seconds) ..."""
 
-STEPPING_BACK = 0.35
-"""... as far as they do not go round: the part of them who step back."""
+CONTRARY = 0.1
+"""So many of them go to the other side."""
 
-ROUND, GOING_ROUND = math.radians(75.0), 2.0
-"""People who block each other all go to the same side, so that the jam begins to turn: how far, and for how long
-(seconds)."""
+GOING_ROUND = 3.0
+"""... and the others go round the jam, for about so long, seconds."""
 
 BLOCKED = 1.0
 """Who is nearer than this in front blocks the way, metres."""
@@ -254,14 +261,20 @@ def decide(
                 patience *= QUEUING
             elif moving.jammed_next[c]:
                 narrow = math.hypot(o[PX], o[PZ]) - people.radius[c] - o[RADIUS] < ROOM
-                back = narrow and not opposed and luck < STEPPING_BACK
-                angle = math.pi if back else ROUND * (people.side[c] if people.side[c] != 0.0 else -1.0)
-                sine, cosine = math.sin(angle), math.cos(angle)
-                dx, dz = dx * cosine + dz * sine, dz * cosine - dx * sine
+                back = narrow and luck < STEPPING_BACK and room_in(seen, count, people.radius[c], -dx, -dz) > ROOM
+                if back:
+                    dx, dz = -dx, -dz
+                else:
+                    own = people.side[c] if people.side[c] != 0.0 else -1.0
+                    if luck > 1.0 - CONTRARY:
+                        own = -own
+                    x, z = moving.position[c, 0], moving.position[c, 1]
+                    dx, dz = round_the_jam(ground, things, standing, x, z, people.radius[c], dx, dz, own)
                 moving.retreat[c] = STEP_BACK if back else GOING_ROUND * (0.6 + 0.8 * luck)
                 moving.retreat_way[c, 0], moving.retreat_way[c, 1] = dx, dz
                 rule, most, side = GIVE_WAY, np.inf, 0.0
                 moving.stuck[c] = 0.5 * STUCK
+                patience = np.inf
         if moving.stuck[c] > patience:
             bx, bz, space = way_out(
                 ground,
@@ -342,7 +355,8 @@ def try_target(
     out = moving.next[c]
     out[0], out[1], out[2], out[3], out[4], out[5], out[6] = x, z, vx, vz, ax, az, heading
     moving.next_turning[c] = turning
-    moving.free[c] = clear_of_ground(ground, things, standing, moving.meant[c], n, people.radius[c]) and (
+    x, z = moving.position[c, 0], moving.position[c, 1]
+    moving.free[c] = clear_of_ground(ground, things, standing, x, z, moving.meant[c], n, people.radius[c]) and (
         conflict(people, moving, cells, farthest, widest, c, False) < 0
     )
     return moving.free[c]
@@ -408,7 +422,7 @@ def fits(
     for m in range(standing):
         if room(ground, things[m], state[0], state[1]) < radius:
             return False
-    if not clear_of_ground(ground, things, standing, path, n, radius):
+    if not clear_of_ground(ground, things, standing, state[0], state[1], path, n, radius):
         return False
     for j in range(len(moving.here)):
         if moving.here[j] and not apart(path, n, moving.path[j], moving.stops[j], 0, radius + people.radius[j] + HAIR):

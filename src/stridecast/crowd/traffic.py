@@ -24,8 +24,8 @@ LONGEST_STOP = 4.0
 BLOCK = 64
 """People a thread takes at a time."""
 
-ARRIVED = 0.35
-"""So near to the end of their way people have arrived, metres."""
+ARRIVED, ABREAST = 0.45, 0.1
+"""People have arrived who are so near to the end of their way, or as far along it and beside it, metres."""
 
 ROOM = 64
 """Rows to begin with."""
@@ -95,6 +95,7 @@ class Traffic:
         if len(rows) < len(news):
             self._grow(len(self.moving.here) + len(news) - len(rows))
             rows = np.flatnonzero(~self.moving.here)[: len(news)]
+        self._forget_ways()
         points, along = [self.ways.points], [self.ways.along]
         begin = len(self.ways.points)
         for row, new in zip(rows.tolist(), news, strict=True):
@@ -126,8 +127,21 @@ class Traffic:
             self._scripts[row] = (new.mover, float(new.mover.times[0]) if self.frame else 0.0)
 
     def remove(self, rows: Int[Array, "leaving"]) -> None:
-        """Let people leave."""
-        self.moving.here[rows] = False
+        """Let people leave; nobody is busy with them any more."""
+        m = self.moving
+        m.here[rows] = False
+        about = np.isin(m.other, rows)
+        m.other[about], m.contact[about], m.since[about] = -1, np.inf, 0.0
+
+    def _forget_ways(self) -> None:
+        """Drop the ways of those who have left, once they are more than the others'."""
+        rows = self.present
+        first, points = self.people.first[rows], self.people.points[rows]
+        if 2 * int(points.sum()) + ROOM >= len(self.ways.points):
+            return
+        kept = np.repeat(first - np.concatenate(([0], np.cumsum(points)[:-1])), points) + np.arange(points.sum())
+        self.people.first[rows] = np.concatenate(([0], np.cumsum(points)[:-1]))
+        self.ways = Ways(points=self.ways.points[kept], along=self.ways.along[kept])
 
     def _grow(self, least: int) -> None:
         count = max(2 * len(self.moving.here), least)
@@ -217,4 +231,6 @@ class Traffic:
         rows = self.present
         rows = rows[(self.people.points[rows] >= 2) & ~self.people.stays[rows] & ~self.people.scripted[rows]]
         last = self.people.first[rows] + self.people.points[rows] - 1
-        return rows[self.ways.along[last] - self.moving.place[rows] < ARRIVED]
+        left = self.ways.along[last] - self.moving.place[rows]
+        away = np.linalg.norm(self.ways.points[last] - self.moving.position[rows], axis=-1)
+        return rows[(left < ABREAST) | ((left < 2 * ARRIVED) & (away < ARRIVED))]

@@ -23,7 +23,7 @@ SPIN = 1.5
 ASKEW, ABOUT = math.radians(35.0), math.radians(100.0)
 """Who has just stood may step aside or back before they have turned that way; beyond these angles ..."""
 
-ASIDE, BACK = 0.3, 0.15
+ASIDE, BACK = 0.35, 0.3
 """... no faster than this, m/s."""
 
 SHARP = math.radians(50.0)

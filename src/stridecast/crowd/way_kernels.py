@@ -20,8 +20,11 @@ WINDOW = 2.0
 BRAKING = 0.7
 """Who will stand at the end of the way slows down as gently as this, m/s2."""
 
-RETREAT_SPEED = 0.5
+RETREAT_SPEED = 0.8
 """Who makes room does so at this speed, m/s."""
+
+ROUND = np.radians(np.array([75.0, 45.0, -75.0, -45.0, 20.0]))
+"""How far to their side people go who go round a jam; below 0 to the other side."""
 
 AROUND = 16
 """Directions in which room is looked for."""
@@ -147,10 +150,43 @@ def way_out(
         angle = 2.0 * math.pi * (k + luck) / AROUND
         ax, az = math.sin(angle), math.cos(angle)
         way = free_way(ground, things, standing, x, z, ax, az, radius + 0.02, 2.5)
-        for m in range(count):
-            way = disc_way(seen[m, PX], seen[m, PZ], ax, az, radius + seen[m, RADIUS] + 0.02, way)
+        way = min(way, room_in(seen, count, radius, ax, az))
         facing = ax * dx + az * dz
         value = way - 0.6 * max(facing, 0.0) - 0.3 * max(-facing - 0.5, 0.0)
         if value > best:
             best, bx, bz, space = value, ax, az, way
     return bx, bz, space
+
+
+@kernel
+def round_the_jam(
+    ground: Ground,
+    things: np.ndarray,
+    standing: int,
+    x: float,
+    z: float,
+    radius: float,
+    dx: float,
+    dz: float,
+    side: float,
+) -> tuple[float, float]:
+    """Direction in which somebody goes round people who block each other: all to the same side, so that the jam turns.
+
+    Where there is a wall on that side, less far round, along it, or to the other side.
+    """
+    for k in range(len(ROUND)):
+        angle = side * ROUND[k]
+        sine, cosine = math.sin(angle), math.cos(angle)
+        ax, az = dx * cosine + dz * sine, dz * cosine - dx * sine
+        if free_way(ground, things, standing, x, z, ax, az, radius + 0.01, 0.6) > 0.3:
+            return ax, az
+    return dx, dz
+
+
+@kernel
+def room_in(seen: np.ndarray, count: int, radius: float, ax: float, az: float) -> float:
+    """How far somebody can go in a direction until they touch somebody else, up to a metre and a half."""
+    way = 1.5
+    for m in range(count):
+        way = disc_way(seen[m, PX], seen[m, PZ], ax, az, radius + seen[m, RADIUS] + 0.01, way)
+    return way

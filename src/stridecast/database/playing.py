@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import gaussian_filter1d, maximum_filter1d
+from scipy.ndimage import gaussian_filter1d
 
 from stridecast.analysis.take import SOLE
-from stridecast.body import kinematics
-from stridecast.body.legs import reach
+from stridecast.body.planting import corrected, feet_of, put_feet, raised, standing, with_toes_up
 from stridecast.database.clips import FIRST, LAST, Clips, toe_off
 from stridecast.geometry import ground
 from stridecast.geometry import quaternions as quat
-from stridecast.model.contacts import SIDES
 from stridecast.model.database import INTERVALS, MotionDatabase
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
@@ -26,23 +24,14 @@ Array = np.ndarray
 RATE = 120.0
 """Feet are planted at about so many frames a second."""
 
-LANDING = 0.12
-"""A foot is held ever more firmly for so long after it came down, seconds, ..."""
+FADE = 0.12
+"""What differs in velocity where the parts of a cycle meet fades within this time, seconds."""
 
-LANDING_SHARE = 0.25
-"""... but for no more than this share of its contact."""
-
-LEAVING = 0.2
-"""What it was held back by is made up within this time once it is free, seconds."""
+LAG = 0.05
+"""The pelvis follows what is done to both feet within about this time, seconds."""
 
 INSTANT = 1e-6
 """Times that differ by less are the same, seconds."""
-
-TIP = 0.004
-"""The tips of the toes stay above this height, metres."""
-
-LONGEST_LEG = 0.996
-"""A leg reaches so far, as a part of its length; the pelvis sinks where that is too short."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -189,7 +178,11 @@ def _blended(
 
 
 def _closed(times: Sequence[Array], features: Sequence[Array]) -> list[Array]:
-    """Features of a cycle whose parts meet: half of what differs, in pose and velocity, is spread over either part."""
+    """Features of a cycle whose parts meet: half of what differs in pose is spread over either part.
+
+    Half of what differs in velocity fades within ``FADE``: over a whole part, it would swing a limb beyond what was
+    recorded.
+    """
     ends: list[tuple[Array, Array]] = []
     starts: list[tuple[Array, Array]] = []
     for t, f in zip(times, features, strict=True):
@@ -200,14 +193,16 @@ def _closed(times: Sequence[Array], features: Sequence[Array]) -> list[Array]:
     for i, (t, f) in enumerate(zip(times, features, strict=True)):
         before, after = ends[i - 1], starts[(i + 1) % len(starts)]
         span = t[LAST] - t[FIRST]
-        u = ((t - t[FIRST]) / span)[:, None]
+        since, left = (t - t[FIRST])[:, None], (t[LAST] - t)[:, None]
+        u, fade = since / span, min(FADE, span)
         at_start = [(there - here) / 2 for there, here in zip(before, starts[i], strict=True)]
         at_end = [(there - here) / 2 for there, here in zip(after, ends[i], strict=True)]
         out.append(
             f
             + at_start[0] * (1 - u) ** 2 * (1 + 2 * u)
             + at_end[0] * u**2 * (3 - 2 * u)
-            + span * (at_start[1] * u * (1 - u) ** 2 + at_end[1] * u**2 * (u - 1))
+            + at_start[1] * since * np.maximum(1 - since / fade, 0.0) ** 2
+            - at_end[1] * left * np.maximum(1 - left / fade, 0.0) ** 2
         )
     return out
 
@@ -248,10 +243,11 @@ def _contacts(
         begin += float(t[LAST] - t[FIRST])
     rounds = 3 if clips.repeats else 1
     edges = [(at + turn * length, state) for turn in range(rounds) for at, state in edges]
+    edges.append((rounds * length if clips.repeats else np.inf, ""))  # what stands when a clip ends stays
     out = []
     for side, letters in enumerate(("LDS", "RDS")):
         since: float | None = None
-        for at, state in [*edges, (rounds * length, "")]:
+        for at, state in edges:
             if state and state in letters:
                 since = at if since is None else since
             elif since is not None:
@@ -274,126 +270,21 @@ def _with_planted_feet(free: Performance) -> Performance:
     """The same performance with feet that stay where they stand."""
     frames = max(24, round(free.seconds * RATE))
     step = free.seconds / frames
-    rounds = (-1, 2) if free.repeats else (0, 1)
-    count = (rounds[1] - rounds[0]) * frames + 1
-    times = (np.arange(count) + rounds[0] * frames) * step
-    skeleton = free.skeleton
-    roots, rotations = free.pose(times)
-    world = kinematics.forward(skeleton, roots, rotations)
-    ankles, planted = [], np.zeros((count, 2), bool)
-    for side, name in enumerate(SIDES):
-        foot, toe = skeleton.chain(f"{name}_foot", f"{name}_toe")
-        own = _all_contacts(free, side)
-        offsets, planted[:, side] = _holding(times, world.positions[:, toe], own, step)
-        sole = quat.rotate(world.rotations[:, foot], skeleton.offsets[toe])
-        goal = world.positions[:, toe] + offsets
-        goal[:, 1] = np.maximum(goal[:, 1], SOLE * skeleton.leg_length)
-        ankles.append(goal - sole)
-    roots = roots - np.array([0.0, 1.0, 0.0]) * _drop(skeleton, world, ankles, step)[:, None]
-    for side, name in enumerate(SIDES):
-        rotations = _with_toes_up(skeleton, roots, reach(skeleton, roots, rotations, name, ankles[side]), name)
+    rounds = 3 if free.repeats else 1  # of a cycle, the middle one: all that plants its feet is periodic there
+    times = (np.arange(rounds * frames + 1) - rounds // 2 * frames) * step
+    motion, planted = free.motion(times, 1 / step, "", ""), free.planted(times)
+    own, sole = feet_of(motion), SOLE * free.skeleton.leg_length
+    feet = raised(corrected(own, raised(standing(own, planted), sole), planted, 1 / step), sole)
+    # Of a cycle the vehicle goes evenly, the recorded one did not: the pelvis follows what is done to both feet.
+    lag = gaussian_filter1d((feet.toes - own.toes).mean(axis=1), LAG / step, axis=0, mode="nearest")
+    motion = with_toes_up(put_feet(replace(motion, root_positions=motion.root_positions + lag), feet, planted))
     positions, headings = free.vehicle(times)
-    away = quat.rotate(quat.about_y(-headings), roots - ground.lift(positions))
-    tangents = quat.log(quat.multiply(quat.inverse(free.references), rotations[:, 1:])).reshape(count, -1)
-    tilt = tangents.shape[1]
-    table = np.concatenate((tangents, free.values(times)[:, tilt : tilt + 3], away, free.values(times)[:, -1:]), axis=1)
+    away = quat.rotate(quat.about_y(-headings), motion.root_positions - ground.lift(positions))
+    joints = quat.log(quat.multiply(quat.inverse(free.references), motion.rotations[:, 1:])).reshape(len(times), -1)
+    table = free.values(times)
+    table[:, : joints.shape[1]], table[:, -4:-1] = joints, away
     if free.repeats:
         table, times = table[frames : 2 * frames + 1], times[frames : 2 * frames + 1]
         table[-1] = table[0]
-        features = CubicSpline(times, table, bc_type="periodic")
-    else:
-        features = CubicSpline(times, table)
-    return Performance(
-        skeleton=skeleton,
-        references=free.references,
-        seconds=free.seconds,
-        repeats=free.repeats,
-        features=features,
-        way=free.way,
-        contacts=free.contacts,
-        speed=free.speed,
-        turn=free.turn,
-    )
-
-
-def _with_toes_up(
-    skeleton: Skeleton, roots: Float[Array, "frames 3"], rotations: Float[Array, "frames joints 4"], side: str
-) -> Float[Array, "frames joints 4"]:
-    """Bend the toes up where their tips would go through the floor."""
-    joint = skeleton.joint(f"{side}_toe")
-    ends = np.flatnonzero(skeleton.end_joints == joint)
-    if len(ends) == 0:
-        return rotations
-    world = kinematics.forward(skeleton, roots, rotations)
-    tip = quat.rotate(world.rotations[:, joint], skeleton.end_offsets[ends[0]])
-    level = np.maximum(np.hypot(tip[:, 0], tip[:, 2]), 1e-9)
-    length = np.maximum(np.linalg.norm(tip, axis=-1), 1e-9)
-    want = np.arcsin(np.clip((TIP - world.positions[:, joint, 1]) / length, -1.0, 1.0))
-    lift = np.maximum(want - np.arctan2(tip[:, 1], level), 0.0)
-    axis = np.stack((-tip[:, 2] / level, np.zeros(len(tip)), tip[:, 0] / level), axis=-1)
-    above = world.rotations[:, skeleton.parents[joint]]
-    raised = quat.multiply(quat.exp(axis * lift[:, None]), world.rotations[:, joint])
-    out = rotations.copy()
-    out[:, joint] = quat.multiply(quat.inverse(above), raised)
-    return out
-
-
-def _all_contacts(free: Performance, side: int) -> list[tuple[float, float]]:
-    """Contacts of a foot over more than three cycles, or over the clip; what stands at its beginning has stood."""
-    own = [(a, b) for s, a, b in free.contacts if s == side]
-    if not free.repeats:
-        return [(a if a > 0 else -1.0, b) for a, b in own]
-    out: list[tuple[float, float]] = []
-    for a, b in sorted((a + n * free.seconds, b + n * free.seconds) for a, b in own for n in range(-3, 4)):
-        if out and a - out[-1][1] < 1e-6:
-            out[-1] = (out[-1][0], b)
-        else:
-            out.append((a, b))
-    return out
-
-
-def _holding(
-    times: Float[Array, "frames"],
-    toe: Float[Array, "frames 3"],
-    contacts: Sequence[tuple[float, float]],
-    step: float,
-) -> tuple[Float[Array, "frames 3"], Bool[Array, "frames"]]:
-    """How far the toe is moved on the ground so that it stays, and when it is held."""
-    offsets, held = np.zeros_like(toe), np.zeros(len(times), bool)
-    for start, stop in sorted(contacts):
-        inside = np.flatnonzero((times >= start - INSTANT) & (times < stop - INSTANT))
-        if len(inside) < 2:
-            continue
-        length = stop - start
-        place = toe[inside[len(inside) // 4 : -(len(inside) // 4) or None]].mean(axis=0)
-        u = np.clip((times[inside] - start) / min(LANDING, LANDING_SHARE * length), 0.0, 1.0)
-        firm = u * u * (3 - 2 * u)
-        if times[inside[0]] - start > step:  # cut by the beginning: it has been held before
-            firm[:] = 1.0
-        away = (place - toe[inside]) * [1.0, 0.0, 1.0]
-        offsets[inside] = away * firm[:, None]
-        held[inside] = True
-        after = np.arange(inside[-1] + 1, min(inside[-1] + 1 + round(LEAVING / step), len(times)))
-        v = ((times[after] - times[inside[-1]]) / LEAVING)[:, None]
-        rate = (offsets[inside[-1]] - offsets[inside[-2]]) / step
-        offsets[after] = offsets[inside[-1]] * (1 - v) ** 2 * (1 + 2 * v) + rate * LEAVING * v * (1 - v) ** 2
-    return offsets, held
-
-
-def _drop(
-    skeleton: Skeleton, world: kinematics.World, ankles: Sequence[Float[Array, "frames 3"]], step: float
-) -> Float[Array, "frames"]:
-    """How far the pelvis sinks so that both legs reach."""
-    need = np.zeros(len(ankles[0]))
-    for name, ankle in zip(SIDES, ankles, strict=True):
-        shin, foot = skeleton.chain(f"{name}_shin", f"{name}_foot")
-        length = LONGEST_LEG * float(np.linalg.norm(skeleton.offsets[[shin, foot]], axis=-1).sum())
-        away = world.positions[:, skeleton.joint(f"{name}_thigh")] - ankle
-        level = np.minimum(np.hypot(away[:, 0], away[:, 2]), length)
-        recorded = np.linalg.norm(
-            world.positions[:, skeleton.joint(f"{name}_thigh")] - world.positions[:, foot], axis=-1
-        )
-        longest = np.maximum(length, recorded)  # a leg that was recorded straight may be straight
-        need = np.maximum(need, away[:, 1] - np.sqrt(np.maximum(longest**2 - level**2, 0.0)))
-    width = 0.05 / step
-    return gaussian_filter1d(maximum_filter1d(np.clip(need, 0.0, 0.05), round(2 * width) + 1), width)
+    features = CubicSpline(times, table, bc_type="periodic" if free.repeats else "not-a-knot")
+    return replace(free, features=features)

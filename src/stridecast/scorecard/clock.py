@@ -17,7 +17,7 @@ Array = np.ndarray
 SAME_MOMENT = 1e-4
 """Times that differ by less are one moment, seconds."""
 
-UNSTEADY = 0.25
+UNSTEADY = 0.3
 """Times may be so far off the clock, as a share of its step: files round them."""
 
 
@@ -103,10 +103,11 @@ def tracks(trajectories: Trajectories, frame_rate: float | None = None) -> Track
     name = f"{trajectories.name}: " if trajectories.name else ""
     moments = np.sort(trajectories.times)
     moments = moments[np.concatenate(([True], np.diff(moments) > SAME_MOMENT))] if len(moments) else moments
-    if len(moments) < 2:
-        raise InputError(f"{name}two or more moments are needed to see anybody move, not {len(moments)}")
+    own = np.diff(trajectories.times)[np.diff(trajectories.ids) == 0]
+    if not len(own):
+        raise InputError(f"{name}nobody is there at two moments, so nobody can be seen to move")
     gaps = np.diff(moments)
-    step = float(gaps[gaps < 1.5 * np.median(gaps)].mean())
+    step = float(own[own < 1.5 * np.median(own)].mean())
     last = int(np.rint(gaps / step).sum())
     step = float(moments[-1] - moments[0]) / max(last, 1)
     start = float(moments[0])

@@ -101,7 +101,7 @@ class CrowdScore:
             "seconds": self.seconds,
             "overlaps": _overlaps_as_json(self.overlaps),
             "solid_overlaps": _overlaps_as_json(self.solid_overlaps),
-            "deadlocks": [asdict(one) for one in self.deadlocks],
+            "deadlocks": [{**asdict(one), "with_people": list(one.with_people)} for one in self.deadlocks],
             "blocking_groups": [list(group) for group in self.blocking_groups],
             "goals_known": int(way.has_goal.sum()),
             "arrived": way.arrived,

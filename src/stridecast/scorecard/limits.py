@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -24,6 +24,7 @@ RESOLUTION = 1e-6
 """Positions are taken to be rounded to so many metres: what that can add to a difference does not count."""
 
 
+@runtime_checkable
 class Bounds(Protocol):
     """What a body can do at each speed; ``Limits`` is one."""
 

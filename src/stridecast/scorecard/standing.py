@@ -129,7 +129,7 @@ def _side_by_side(
         row = min(int(np.searchsorted(tracks.trajectories.times[rows], middle)), rows.stop - rows.start - 1)
         places.append(tracks.trajectories.positions[rows.start + row])
     one, other = places
-    return float(np.linalg.norm(one - other)) - radii[k] - radii[j] <= NEXT_TO
+    return bool(np.linalg.norm(one - other) - radii[k] - radii[j] <= NEXT_TO)
 
 
 def blocking_groups(found: list[Deadlock]) -> list[tuple[int, ...]]:
