@@ -221,7 +221,6 @@ class TestComingAndLeaving:
         assert np.nanmedian(neighbours) < 1.5
         assert overlap(did) <= 1e-9
 
-    @pytest.mark.xfail(strict=True, reason="those who come together in motion are not held against each other")
     def test_groups_come_in_motion_without_touching_each_other(self, database):
         area = np.array([(-6.0, 0.0), (6.0, 0.0), (6.0, 3.0), (-6.0, 3.0)])
         gate = Route(stops=(np.array([(-6.0, 20.0), (6.0, 20.0)]),))
@@ -274,7 +273,6 @@ class TestExplaining:
         assert other in str(passing)
         assert "passing on the left" in passing.why
 
-    @pytest.mark.xfail(strict=True, reason="who has left is taken for a moving obstacle until the next decision")
     def test_who_has_left_is_no_obstacle_that_moves(self, database):
         crowd = crowd_of(
             database,
@@ -345,16 +343,15 @@ class TestRefusals:
             np.testing.assert_array_equal(a.positions, b.positions)
             np.testing.assert_array_equal(a.rules, b.rules)
 
-    @pytest.mark.xfail(strict=True, reason="who is due is forgotten when a way cannot be found")
-    def test_a_step_that_fails_changes_nothing(self, database):
+    def test_who_has_no_way_stays_out_and_everybody_else_goes_on(self, database, caplog):
         room = Wall(name="room", points=np.array([(-2, -2), (2, -2), (2, 2), (-2, 2), (-2, -2)], float))
-        crowd = crowd_of(
-            database, person("free", (9.0, 0.0), (9.0, 30.0)), sources=(point_source("cell"),), walls=(room,)
-        )
-        told = []
-        for _ in range(2):
-            with pytest.raises(PathError, match="person 'cell 1'"):
-                frames(crowd, 10.0)
-            frame = crowd.frame()
-            told.append((crowd.time, crowd.waiting, frame.positions.tolist(), len(crowd.came)))
-        assert told[0] == told[1]
+        late = person("late", (9.0, 0.0), (9.0, 5.0), begins=2.0)
+        free = person("free", (12.0, 0.0), (12.0, 30.0))
+        crowd = crowd_of(database, late, free, sources=(point_source("cell", flow=3.0, most=4),), walls=(room,))
+        alone = crowd_of(database, late, free, walls=(room,))
+        for _ in range(150):
+            a, b = crowd.step(), alone.step()
+            np.testing.assert_array_equal(a.positions, b.positions)
+        assert [p.name for p in crowd.came] == ["free", "late"]
+        assert [p.name for p in crowd.turned_away] == [f"cell {k + 1}" for k in range(4)]
+        assert "person 'cell 1'" in caplog.text

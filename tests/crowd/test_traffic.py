@@ -130,7 +130,6 @@ class TestSafety:
             settle(p, m, cells, 1.0, 0.3, granted, 0, len(m.here))
             np.testing.assert_array_equal(granted[rows], np.arange(2) == first)
 
-    @pytest.mark.xfail(strict=True, reason="the next place itself is not held against what stands")
     @settings(max_examples=60)
     @given(SEEDS, st.sampled_from([10.0, 20.0, 30.0, 60.0]))
     def test_a_step_that_is_taken_leaves_room_to_walls(self, seed, rate):
@@ -473,3 +472,26 @@ class TestComing:
         assert traffic.moving.place[row] == traffic.moving.stuck[row] == 0.0
         np.testing.assert_array_equal(traffic.moving.position[rows[1:]], before)
         assert sorted(traffic.present) == sorted(rows)
+
+    def test_ways_of_who_has_left_are_forgotten_and_nobody_elses(self):
+        stays = somebody(0, (0.0, 0.0), (4.0, 3.0), (0.0, 9.0))
+        traffic, (row,) = traffic_of([stays])
+        longest = 0
+        for k in range(1, 60):
+            (other,) = traffic.add([somebody(k, (20.0, 0.0), (20.0, 30.0))])
+            longest = max(longest, len(traffic.ways.points))
+            first, count = traffic.people.first[row], traffic.people.points[row]
+            np.testing.assert_array_equal(traffic.ways.points[first : first + count], stays.way)
+            assert traffic.ways.along[first] == 0.0
+            assert traffic.ways.along[first + count - 1] == pytest.approx(5.0 + np.hypot(4.0, 6.0))
+            traffic.remove(np.array([other]))
+        assert longest < 10 * 121
+
+    def test_nobody_is_busy_with_who_has_left(self):
+        people = [somebody(0, (0.0, 0.0), (0.0, 12.0)), somebody(1, (0.1, 8.0), (0.0, -4.0))]
+        traffic, (one, other) = traffic_of(people)
+        while traffic.moving.other[one] != other:
+            traffic.step()
+        traffic.remove(np.array([other]))
+        assert traffic.moving.other[one] == -1
+        assert traffic.moving.contact[one] == np.inf
