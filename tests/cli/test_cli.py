@@ -245,6 +245,20 @@ def test_scenes_are_walked(tmp_path):
     assert "scene.yaml" in refused("walk", "--scene", scene, "-o", out)
 
 
+def test_a_walk_has_a_style(tmp_path):
+    path = tmp_path / "path.csv"
+    path.write_text("x,z\n0,0\n0,3\n")
+    written = {}
+    for way in (("--curve", "line:3"), ("--path", path)):
+        for style in ("gloomy", "-1", "0", "neutral", None):
+            out = tmp_path / f"{style}.bvh"
+            call("walk", *way, "-o", out, "-q", *(() if style is None else ("--style", style)))
+            written[way[0], style] = out.read_text()
+        own = {style: text for (kind, style), text in written.items() if kind == way[0]}
+        assert own["gloomy"] == own["-1"] != own["0"]
+        assert own["0"] == own["neutral"] == own[None]
+
+
 def test_usual_speeds_belong_to_the_motion(database, tmp_path):
     for motion, seconds in (("walk", 2 + 6 / 1.3), ("run", 2 + 6 / 3.0)):
         result = call("walk", database, "--curve", "line", "--motion", motion, "-o", tmp_path / "out.bvh", "--json")
@@ -268,6 +282,11 @@ def test_a_walk_that_cannot_be_is_refused(database, points, tmp_path):
         (["--path", points, "--half-life", 0.2], "what is planned needs no spring"),
         (["--path", points, "--motion", "stand"], "nobody stands along a path"),
         (["--curve", "line", "--size", "huge"], "no size 'huge' of movement; there are calm, neutral"),
+        (
+            ["--curve", "line", "--style", "merry"],
+            "a style is gloomy, neutral, brisk or a number from -1 (gloomy) to 1",
+        ),
+        (["--path", points, "--style", "1.2"], "to 1 (brisk), not 1.2"),
         (["--curve", "line", "--input", points], "exactly one of"),
         (["--input", points, "--speed", 1], "--speed goes with --curve and --path"),
         (["--curve", "spiral:3"], "no curve 'spiral'; there are line:6"),

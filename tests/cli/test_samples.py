@@ -140,8 +140,8 @@ def test_take_and_truth_are_written_both_or_neither(out, monkeypatch):
 
 def test_the_sample_database_is_shown_where_none_is_named(corpus):
     content = json.loads(call("show", "--json").stdout)
-    assert (content["takes"], content["subjects"]) == (2, ["sample"])
-    assert "2 takes used" in call("show").stdout
+    assert (content["takes"], content["subjects"]) == (3, ["sample"])
+    assert "3 takes used" in call("show").stdout
     assert corpus.made == 1
 
 
@@ -166,7 +166,7 @@ def test_what_is_wrong_with_the_cache_is_a_note(tmp_path):
     (tmp_path / "home").write_text("a file, not a folder")
     result = call("show", "--json")
     assert result.exit_code == 0
-    assert json.loads(result.stdout)["takes"] == 2
+    assert json.loads(result.stdout)["takes"] == 3
     assert result.stderr.startswith("note: the sample database is made anew by each process, as it cannot be kept: ")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from stridecast.analysis.style import stoop
 from stridecast.analysis.take import analyse
 from stridecast.errors import TakeError
 from stridecast.formats.recordings import load_motion
@@ -122,3 +123,26 @@ def test_progress_reaches_the_end(sample_person):
     walk_along(sample_person, ways()["line"], progress=lambda done, total: told.append((done, total)))
     assert told[-1][0] == told[-1][1]
     assert all(a <= b for a, b in told)
+
+
+def test_style_is_that_of_behavior_and_stations(sample_person, caplog):
+    """Somebody sets off gloomily, is cheered up at a station, and can be told otherwise as a whole."""
+    way = Curve.through(named_curve("line:9"))
+    sad, better = Behavior(style=-1.0), (Station(distance=5.0, style=0.0),)
+    walks = {
+        "neutral": walk_along(sample_person, way),
+        "changing": walk_along(sample_person, way, sad, better),
+        "told": walk_along(sample_person, way, sad, better, style="neutral"),
+    }
+    bent = {}
+    for name, walk in walks.items():
+        motion, headings = walk.journey.motion, walk.journey.headings
+        bends = stoop(motion.skeleton, motion.rotations[:, None], headings[:, None])
+        assert walk.arrived
+        bent[name] = [
+            bends[(walk.distances > low) & (walk.distances < high)].mean() for low, high in ((1, 4.5), (6.5, 8))
+        ]
+    assert bent["changing"][0] > bent["neutral"][0] + 0.2
+    assert bent["changing"][1] < bent["neutral"][1] + 0.05
+    np.testing.assert_array_equal(walks["told"].journey.motion.rotations, walks["neutral"].journey.motion.rotations)
+    assert not caplog.records

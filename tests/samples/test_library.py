@@ -60,9 +60,13 @@ def warnings(caplog) -> list[str]:
     return [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
 
 
-def test_it_is_learned_from_the_neutral_takes_and_public(corpus):
+def test_it_is_learned_from_takes_of_every_style_and_public(corpus):
     database = sample_database()
-    assert [(take.name, take.subject) for take in database.takes] == [("walk", "sample"), ("start", "sample")]
+    assert [(take.name, take.subject) for take in database.takes] == [
+        ("walk", "sample"),
+        ("start", "sample"),
+        ("trudge", "sample"),
+    ]
     assert {"walk", "stand", "stand-walk"} & set(database.motions)
     assert stridecast.sample_database is sample_database
 
@@ -319,7 +323,7 @@ def test_of_two_processes_at_once_one_waits_for_the_other(folder, tmp_path):
     go.touch()
     ends = [process.communicate(timeout=60)[0] for process in processes]
     assert [process.returncode for process in processes] == [0, 0], said.read_text()
-    assert sorted(ends) == ["has 2\n", "makes\nhas 2\n"]
+    assert sorted(ends) == ["has 3\n", "makes\nhas 3\n"]
     assert said.read_text() == WAITING
     assert len(kept(folder)) == 1
 
@@ -333,6 +337,6 @@ def test_a_process_that_is_killed_keeps_nobody_waiting(folder, tmp_path):
     first.kill()
     first.communicate(timeout=30)
     go.touch()
-    assert second.communicate(timeout=60)[0] == "makes\nhas 2\n"
+    assert second.communicate(timeout=60)[0] == "makes\nhas 3\n"
     assert (second.returncode, said.read_text()) == (0, WAITING)
     assert len(kept(folder)) == 1

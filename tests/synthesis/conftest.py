@@ -28,3 +28,11 @@ def recordings(mocap: Path) -> MotionDatabase:
 def database(request: pytest.FixtureRequest) -> MotionDatabase:
     """The same laws for people made of formulas and for recorded ones."""
     return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(scope="session")
+def sample_person() -> MotionDatabase:
+    """The database of the sample person, made once for this machine."""
+    from stridecast.samples.library import sample_database
+
+    return sample_database()

@@ -14,7 +14,8 @@ from stridecast.geometry import ground
 from stridecast.model.database import MotionDatabase
 from stridecast.model.pose import Pose, VehicleState
 from stridecast.synthesis.tables import make_tables
-from stridecast.synthesis.walker import LONGEST_STEP, Walkers
+from stridecast.synthesis.walker import Walkers
+from stridecast.synthesis.wishes import LONGEST_STEP
 from vehicles import Body, Track, at, bodies_of, body_of, track, tracks
 
 RATES = (30.0, 60.0)

@@ -152,7 +152,8 @@ def test_a_size_changes_nothing_of_the_way(formulas):
     batches = [Walkers(formulas, np.zeros((1, 2)), size=size) for size in ("neutral", "exaggerated")]
     for point in ways:
         poses = [batch.step(point[None]) for batch in batches]
-        np.testing.assert_array_equal(poses[0].vehicle.position, poses[1].vehicle.position)
+        # Other weights of examples that last equally long: a half cycle ends at the same time but for rounding.
+        np.testing.assert_allclose(poses[0].vehicle.position, poses[1].vehicle.position, rtol=0.0, atol=1e-12)
         assert poses[0].group == poses[1].group
 
 

@@ -11,7 +11,8 @@ from stridecast.errors import DatabaseError, InputError, WishError
 from stridecast.geometry import ground
 from stridecast.model.pose import Pose
 from stridecast.steering.force import SteeringGains
-from stridecast.synthesis.walker import FARTHEST, Walker, Walkers
+from stridecast.synthesis.walker import Walker, Walkers
+from stridecast.synthesis.wishes import FARTHEST
 from walks import motions_of, points_of
 
 FRAMES = 45

@@ -58,6 +58,10 @@ def walk(
         str | None,
         typer.Option(metavar="calm|neutral|lively|exaggerated", help="Size of movement; else that of the scene."),
     ] = None,
+    style: Annotated[
+        str | None,
+        typer.Option(metavar="gloomy|neutral|brisk|NUMBER", help="Mood, -1 to 1; else that of the scene, or neutral."),
+    ] = None,
     subject: Annotated[str | None, typer.Option(help="Move in the manner of this person of the database.")] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Frames a second; else the database's.")] = None,
     half_life: Annotated[
@@ -91,7 +95,9 @@ def walk(
     for place in (output, trace):
         if place is not None:
             check_place(place)
-    how = {"subject": subject, "frame_rate": rate, "size": size}
+    how: dict[str, Any] = {"subject": subject, "frame_rate": rate, "size": size}
+    if style is not None:
+        how["style"] = _style(style)
     walked: PathWalk | None = None
     words = {"way": "finding a way", "walk": "walking"}
     if path is not None or scene is not None:
@@ -155,6 +161,16 @@ def _gains(half_life: float | None, damping_ratio: float | None) -> SteeringGain
 
     given = {"half_life": half_life, "damping_ratio": damping_ratio}
     return SteeringGains(**{name: value for name, value in given.items() if value is not None})
+
+
+def _style(text: str) -> float:
+    from stridecast.synthesis.styles import style_numbers
+
+    try:
+        value: float | str = float(text)
+    except ValueError:
+        value = text
+    return float(style_numbers(value, 1)[0])
 
 
 def _followed(

@@ -53,8 +53,9 @@ class Bodies:
         phases: Float[Array, "rows"],
         heights: Float[Array, "rows"],
         sizes: list[str],
+        styles: Float[Array, "rows"],
     ) -> None:
-        """Put new people into rows, ``heights`` in metres."""
+        """Put new people into rows, ``heights`` in metres; the rest as in ``Walkers.place``."""
         while len(rows) and rows.max() >= len(self.roots):
             self._grow()
         self.scales[rows] = heights / self.height
@@ -63,7 +64,9 @@ class Bodies:
             own = rows[inside] - pool * POOL
             scaled = positions[inside] / self.scales[rows[inside], None]
             chosen = [sizes[k] for k in np.flatnonzero(inside)]
-            self._pools[pool].place(own, scaled, headings[inside], phase=phases[inside], size=chosen)
+            self._pools[pool].place(
+                own, scaled, headings[inside], phase=phases[inside], size=chosen, style=styles[inside]
+            )
 
     def step(
         self,

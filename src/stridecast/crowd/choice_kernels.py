@@ -50,10 +50,10 @@ DETOUR = 0.8
 IMPATIENCE = 0.3
 """How the price of standing grows with every second in which one does not get on."""
 
-HEADWAY = 0.9
-"""Distance in front at which people take up two thirds of their speed, metres."""
+HEADWAY = 0.4
+"""Distance in front at which people have two thirds of their speed, metres."""
 
-JAM = 0.12
+JAM = 0.08
 """Nearer than this nobody follows, metres."""
 
 FREE = 6.0
@@ -62,7 +62,7 @@ FREE = 6.0
 GENTLY = 0.8
 """Up to who does not go the same way people go so fast that they can stop as gently as this, m/s2."""
 
-LEAD = 0.4
+LEAD = 0.8
 """Who goes on in front makes so much room, seconds of their speed."""
 
 IN_FRONT = 0.7

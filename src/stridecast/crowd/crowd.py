@@ -338,6 +338,7 @@ class Crowd:
                 phases=np.array([_chance(person.name, self.seed, "phase") for person in group]),
                 heights=np.array([person.height or self._bodies.height for person in group]),
                 sizes=[person.behavior.size for person in group],
+                styles=np.array([person.behavior.style for person in group]),
             )
         return True
 

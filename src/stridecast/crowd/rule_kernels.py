@@ -42,6 +42,12 @@ PERSISTS, PERSISTS_LONGER = 2.0, 4.0
 OFFSET = 0.7
 """Who has no preference passes on the right, unless the other is so far to the right, in parts of both radii."""
 
+ELBOWS = 0.1
+"""Room that somebody takes beyond their body who overtakes, metres."""
+
+CLOSING_UP = 0.15
+"""Who follows may be so much faster, m/s."""
+
 QUEUES = 0.3
 """Somebody who stands and faces the way one goes (cosine) waits in a queue."""
 
@@ -91,7 +97,7 @@ def answer(
     # What would happen on the way as meant, at the speed at which one is.
     pace = max(math.hypot(moving.velocity[c, 0], moving.velocity[c, 1]), min(wish, 0.6))
     ux, uz = pace * dx, pace * dz
-    radius, keep, waits = people.radius[c], people.keep[c], people.waits[c]
+    radius, waits = people.radius[c], people.waits[c]
     threat, soonest = -1, WINDOW
     for m in range(count):
         o = seen[m]
@@ -127,9 +133,9 @@ def answer(
     elif between < SAME:
         along = ex * dx + ez * dz
         left, right = room_beside(moving, ground, things, standing, seen, count, c, threat, dx, dz)
-        need = 2.0 * radius + keep + 0.1
+        need = 2.0 * radius + ELBOWS
         if max(left, right) < need or wish < along + 0.1:
-            return FOLLOW, j, soonest, 0.0, along
+            return FOLLOW, j, soonest, 0.0, along + CLOSING_UP
         if people.side[c] == 0.0 and abs(left - right) > 0.5:
             side = 1.0 if left > right else -1.0
         if (left if side > 0.0 else right) < need:

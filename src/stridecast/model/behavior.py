@@ -62,7 +62,7 @@ class Behavior:
     size
         How large movements are: one of ``SIZES``.
     style
-        From gloomy (-1) to brisk (1); 0 is neutral. Mining answers to it; walkers do not yet, and say so.
+        From gloomy (-1) to brisk (1); 0 is neutral. Walkers show it as far as their database does.
     preference
         What is done where there is a choice.
     body_radius

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -17,10 +16,10 @@ from stridecast.paths.curve import Curve
 from stridecast.paths.generate import generate_path
 from stridecast.paths.plan import SpeedPlan, plan_speeds
 from stridecast.synthesis.journey import Journey, journey_of
+from stridecast.synthesis.styles import Style
 from stridecast.synthesis.walker import Walker
 
 Array = np.ndarray
-log = logging.getLogger("stridecast")
 
 STIFFNESS = 3.0
 """How fast a distance from the curve is made up, 1/s (a critically damped spring)."""
@@ -77,6 +76,7 @@ def walk_scene(
     subject: str | None = None,
     frame_rate: float | None = None,
     size: str | None = None,
+    style: Style | None = None,
     finding: Callable[[float], None] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> PathWalk:
@@ -84,7 +84,7 @@ def walk_scene(
 
     Parameters
     ----------
-    database, subject, frame_rate, size, progress
+    database, subject, frame_rate, size, style, progress
         See ``walk_along``.
     scene
         The place and the task.
@@ -97,7 +97,7 @@ def walk_scene(
         See ``generate_path`` and ``plan_speeds``.
     """
     way = generate_path(scene, progress=finding)
-    how = {"subject": subject, "frame_rate": frame_rate, "size": size}
+    how = {"subject": subject, "frame_rate": frame_rate, "size": size, "style": style}
     return walk_along(database, way.curve, scene.behavior, scene.stations, progress=progress, **how)  # type: ignore[arg-type]
 
 
@@ -110,6 +110,7 @@ def walk_along(
     subject: str | None = None,
     frame_rate: float | None = None,
     size: str | None = None,
+    style: Style | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> PathWalk:
     """Let a character walk along a curve as planned, from standing at its beginning to standing at its end.
@@ -122,6 +123,8 @@ def walk_along(
         The way, how to go, and where that changes (see ``plan_speeds``).
     size
         Size of movement instead of the behavior's.
+    style
+        Style instead of the behavior's (see ``Walkers.step``).
     progress
         Called with frames done and frames in all, about once a second of the walk.
 
@@ -131,8 +134,6 @@ def walk_along(
         See ``plan_speeds``.
     """
     plan = plan_speeds(curve, database, behavior, stations)
-    if any(b.style for b in plan.behaviors):
-        log.warning("a walker cannot yet choose a style: it goes in the manner of its database")
     walker = Walker(
         database,
         curve.points[0],
@@ -140,6 +141,7 @@ def walk_along(
         subject=subject,
         frame_rate=frame_rate,
         size=size or plan.behaviors[0].size,
+        style=plan.behaviors[0].style if style is None else style,
     )
     rate = walker.frame_rate
     expected = int((plan.seconds + PAUSE) * rate) + 1
@@ -149,8 +151,9 @@ def walk_along(
     place, velocity, position, resting = 0.0, np.zeros(2), curve.points[0], 0
     while len(poses) < most and resting < PAUSE * rate:
         acceleration, rests_in, motion = _wish(curve, plan, place, position, velocity)
-        now = size or plan.behavior_at(place).size
-        pose = walker.step(acceleration=acceleration, rests_in=rests_in, motion=motion, size=now)
+        here = plan.behavior_at(place)
+        how = {"size": size or here.size, "style": here.style if style is None else style}
+        pose = walker.step(acceleration=acceleration, rests_in=rests_in, motion=motion, **how)  # type: ignore[arg-type]
         position, velocity = pose.vehicle.position, pose.vehicle.velocity
         place = _place(curve, position, place)
         poses.append(pose)

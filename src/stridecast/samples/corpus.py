@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -128,6 +129,29 @@ def _walking(style: str, prefix: str = "") -> list[Recipe]:
     ]
 
 
+def _in_a_mood(style: str) -> list[Recipe]:
+    """What a walker needs to go everywhere in a mood: less of each than of the usual manner, but of everything."""
+    how: dict[str, Any] = {"style": style}
+    run: dict[str, Any] = {"style": style, "running": True}
+    circle = Leg(seconds=6.0, rate=0.8), Leg(seconds=6.0, rate=-0.8)
+    return [
+        *_walking(style, f"{style}_"),
+        Recipe(name=f"{style}_walk_turns_slow", speed=0.85, legs=(*_bends(RIGHT_ANGLE, 2.4, 1.2),), **how),
+        Recipe(name=f"{style}_walk_turns_fast", speed=1.6, legs=(*_bends(RIGHT_ANGLE, 1.8, 0.8, 1.4, 1.6),), **how),
+        Recipe(name=f"{style}_walk_about", speed=1.2, legs=(*_bends(ABOUT, 2.4, 0.6, 0.9, 1.2),), **how),
+        Recipe(name=f"{style}_walk_circles", speed=1.1, legs=circle, **how),
+        Recipe(name=f"{style}_walk_changes", speed=0.8, legs=(*_back_and_forth(0.8, 1.7, 1.8, 0.8),), **how),
+        Recipe(name=f"{style}_walk_start_stop_slow", legs=(*_from_rest(0.8, 1.4, 1.7, (1.8, 2.3)),), **how),
+        Recipe(name=f"{style}_walk_start_stop_fast", legs=(*_from_rest(1.7, 2.5, 2.8, (0.5, 1.0)),), **how),
+        Recipe(name=f"{style}_run", speed=2.0, legs=(Leg(seconds=18.0, speed=4.5),), **run),
+        Recipe(name=f"{style}_run_turns", speed=2.5, legs=(*_bends(RIGHT_ANGLE, 1.7, 1.4),), **run),
+        Recipe(name=f"{style}_run_turns_fast", speed=3.4, legs=(*_bends(RIGHT_ANGLE, 2.0, 0.8, 2.8, 3.4),), **run),
+        Recipe(name=f"{style}_run_changes", speed=2.3, legs=(*_back_and_forth(2.3, 3.8, 1.6, 0.8),), **run),
+        Recipe(name=f"{style}_walk_jog", speed=1.7, legs=(*_back_and_forth(1.7, 2.5, 0.9, 1.6, run=True),), **how),
+        Recipe(name=f"{style}_run_start_stop", legs=(*_from_rest(3.0, 1.6, 1.6, (1.6, 2.1), running=True),), **how),
+    ]
+
+
 RECIPES: tuple[Recipe, ...] = (
     Recipe(name="stand", legs=(Leg(seconds=20.0),)),
     *_walking("neutral"),
@@ -171,9 +195,8 @@ RECIPES: tuple[Recipe, ...] = (
     Recipe(name="walk_jog", speed=1.7, legs=(*_back_and_forth(1.7, 2.5, 0.9, 2.0, run=True),)),
     Recipe(name="run_start_stop", legs=(*_from_rest(3.0, 1.6, 1.6, (1.6, 2.1, 1.8), running=True),)),
     Recipe(name="run_start_stop_fast", legs=(*_from_rest(3.8, 2.0, 2.0, (1.5, 1.9), running=True),)),
-    *_walking("brisk", "brisk_"),
-    *_walking("gloomy", "gloomy_"),
-    Recipe(name="brisk_run", speed=2.2, running=True, legs=(Leg(seconds=20.0, speed=4.0),), style="brisk"),
+    *_in_a_mood("brisk"),
+    *_in_a_mood("gloomy"),
 )
 """All sample takes."""
 

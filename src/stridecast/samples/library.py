@@ -25,10 +25,6 @@ if TYPE_CHECKING:
 STAGES = ("make", "analyse", "assemble")
 """What ``progress`` is told about, in this order."""
 
-STYLES = ("neutral",)
-"""The sample takes that are learned from. A walker picks its examples by speed and pose and cannot yet tell styles
-apart: learning from all of them, it would change its mood from step to step."""
-
 PATIENCE = 600.0
 """So long another process is waited for that makes the sample database, seconds."""
 
@@ -41,8 +37,9 @@ _one_at_a_time = threading.Lock()
 def sample_database(*, progress: Progress | None = None) -> MotionDatabase:
     """Motion database that comes with the package, of a person who stands, walks and runs.
 
-    It is learned from the sample takes when it is first asked for, which takes some seconds, and kept as a file in the
-    user's cache folder. Whatever is wrong with that folder costs time, and is logged, but it stops nothing.
+    They do so in a neutral, a brisk and a gloomy manner. It is learned from the sample takes when it is first asked
+    for, which takes some seconds, and kept as a file in the user's cache folder. Whatever is wrong with that folder
+    costs time, and is logged, but it stops nothing.
 
     Parameters
     ----------
@@ -123,7 +120,7 @@ def _learn(progress: Progress | None) -> MotionDatabase:
         if progress is not None:
             progress("make", done, total)
 
-    motions = [take.motion for take in sample_takes(progress=tell) if take.style in STYLES]
+    motions = [take.motion for take in sample_takes(progress=tell)]
     # An analysis is over before a process would have started.
     return build(motions, cache=False, jobs=1, progress=progress)
 

@@ -74,7 +74,7 @@ def blended(tables: Tables, state: State, c: int, generic: float, out: np.ndarra
     scale = state.scale[c]
     if scale != 1.0:
         for k in range(len(out)):
-            out[k] = tables.neutral[k] + scale * (out[k] - tables.neutral[k])
+            out[k] = state.stance[c, k] + scale * (out[k] - state.stance[c, k])
 
 
 @kernel

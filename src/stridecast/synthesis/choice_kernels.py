@@ -1,4 +1,4 @@
-"""Which segment comes next, and of which examples it is blended (KS05, KS07 "Adding Details")."""
+"""Which segment comes next, and of which examples it is blended (KS05, KS07 "Adding Details"; style: BJL 4.1)."""
 
 from __future__ import annotations
 
@@ -18,6 +18,19 @@ AHEAD = 0.22
 
 POSE_SCALE = 0.12
 """... and as much as a pose that differs by this on average, radians."""
+
+STYLE_SCALE = 0.2
+"""... and as much as a style that differs by this; ..."""
+
+STYLE_MOST = 16.0
+"""... but no difference in style weighs more than this in a squared distance: a sharp turn is one in any mood."""
+
+STYLE_TOLERANCE = 0.1
+"""A blend whose style is off by no more is left as it is."""
+
+NEARBY, FAR = 3.0, 7.0
+"""Examples are called in for their style alone where they are no further off than the first of these (squared distance)
+beyond what would be chosen otherwise; less and less up to the second."""
 
 ENTRY_TOLERANCE = 0.2
 """A transition can begin this far outside the speeds at which its examples began, m/s."""
@@ -51,6 +64,7 @@ def begin_group(tables: Tables, state: State, c: int, group: int, generic: float
     state.group[c] = group
     describe_vehicle(tables, state, c)
     blend_nearest(tables, state, c, group)
+    take_stance(tables, state, c)
     speed = math.hypot(state.velocity[c, 0], state.velocity[c, 1])
     state.started[c] = speed
     state.segments[c] += 1
@@ -147,8 +161,8 @@ def first_group(tables: Tables, state: State, c: int, request: int) -> int:
 
 
 @kernel
-def distance(tables: Tables, state: State, c: int, e: int, most: float) -> float:
-    """Squared distance of an example's beginning from what the character does: vehicle and pose.
+def distance(tables: Tables, state: State, c: int, e: int, style: float, most: float) -> float:
+    """Squared distance of an example's beginning from what the character does, and in style: vehicle, style, pose.
 
     What is ``most`` or more is not worked out to the end.
     """
@@ -156,7 +170,8 @@ def distance(tables: Tables, state: State, c: int, e: int, most: float) -> float
     a = (state.choice[c, 0] - tables.parameters[e, 0] + AHEAD * more) / SPEED_SCALE
     b = more / TANGENTIAL_SCALE
     d = (state.choice[c, 2] - tables.parameters[e, 2]) / LATERAL_SCALE
-    total = a * a + b * b + d * d
+    s = (tables.styles[e] - style) / STYLE_SCALE
+    total = a * a + b * b + d * d + s * s / (1.0 + s * s / STYLE_MOST)
     if total >= most:
         return total
     return total + 3.0 * unlike(tables.beginnings[e], state.features[c], tables.feature_weights) / POSE_SCALE**2
@@ -180,39 +195,103 @@ def unlike(a, b, weights):  # type: ignore[no-untyped-def]
 @kernel
 def nearest(tables: Tables, state: State, c: int, h: int, most: float) -> float:
     """Smallest distance to any example of a group, at most ``most``."""
-    best = most
+    best, style = most, style_in(tables, state, c, h)
     for e in range(tables.first[h], tables.first[h] + tables.sizes[h]):
         if tables.allowed[e]:
-            best = min(best, distance(tables, state, c, e, best))
+            best = min(best, distance(tables, state, c, e, style, best))
     return best
 
 
 @kernel
-def blend_nearest(tables: Tables, state: State, c: int, h: int) -> None:
-    """Weights over the nearest examples of a group: 1/d2 less what the first one left out would get (BJL eq. 3).
+def style_in(tables: Tables, state: State, c: int, h: int) -> float:
+    """The style wanted, or what comes nearest to it in a group."""
+    return min(max(state.style[c], tables.style_range[h, 0]), tables.style_range[h, 1])
 
-    So weights fall to nothing where a neighbour drops out of the blend, and an exact hit takes all the weight.
+
+@kernel
+def blend_nearest(tables: Tables, state: State, c: int, h: int) -> None:
+    """Weights over the nearest examples of a group; where they miss the style wanted, over some on both sides of it."""
+    style = style_in(tables, state, c, h)
+    choose(tables, state, c, h, style, -2.0, 2.0, 0, NEIGHBOURS)
+    shown = shown_style(tables, state, c)
+    if abs(shown - style) <= STYLE_TOLERANCE:
+        return
+    # In between what there is: the other side is called in too, so that together they show the style wanted.
+    half = NEIGHBOURS // 2
+    near = distance(tables, state, c, state.chosen[c, 0], tables.styles[state.chosen[c, 0]], 1e18)
+    for n in range(half, NEIGHBOURS):
+        state.weights[c, n] = 0.0
+    total = 0.0
+    for n in range(half):
+        total += state.weights[c, n]
+    for n in range(half):
+        state.weights[c, n] /= total
+    shown = shown_style(tables, state, c)
+    if shown < style:
+        choose(tables, state, c, h, style, style - 1e-9, 2.0, half, NEIGHBOURS - half)
+    else:
+        choose(tables, state, c, h, style, -2.0, style + 1e-9, half, NEIGHBOURS - half)
+    other = 0.0
+    for n in range(half, NEIGHBOURS):
+        other += state.weights[c, n] * tables.styles[state.chosen[c, n]]
+    share = 0.0 if other == shown else min(max((style - shown) / (other - shown), 0.0), 1.0)
+    e = state.chosen[c, half]
+    further = distance(tables, state, c, e, tables.styles[e], 1e18) - near
+    share *= min(max((FAR - further) / (FAR - NEARBY), 0.0), 1.0)
+    for n in range(NEIGHBOURS):
+        state.weights[c, n] *= share if n >= half else 1.0 - share
+
+
+@kernel
+def shown_style(tables: Tables, state: State, c: int) -> float:
+    """Style of the examples chosen, on average."""
+    shown = 0.0
+    for n in range(NEIGHBOURS):
+        shown += state.weights[c, n] * tables.styles[state.chosen[c, n]]
+    return shown
+
+
+@kernel
+def take_stance(tables: Tables, state: State, c: int) -> None:
+    """How people stand whose style is that of the examples chosen; small movements are small against this."""
+    shown = shown_style(tables, state, c)
+    mood = 0 if shown < 0.0 else 2
+    whole = tables.stance_styles[mood] - tables.stance_styles[1]
+    share = min(max((shown - tables.stance_styles[1]) / whole, 0.0), 1.0) if whole != 0.0 else 0.0
+    for k in range(tables.stances.shape[1]):
+        state.stance[c, k] = tables.stances[1, k] + share * (tables.stances[mood, k] - tables.stances[1, k])
+
+
+@kernel
+def choose(
+    tables: Tables, state: State, c: int, h: int, style: float, low: float, high: float, slot: int, count: int
+) -> None:
+    """Fill ``count`` slots with the nearest examples of a group among those of styles from ``low`` to ``high``.
+
+    Weights are 1/d2 less what the first one left out would get (BJL eq. 3). So weights fall to nothing where a
+    neighbour drops out of the blend, and an exact hit takes all the weight.
     """
     found, which = state.found[c], state.found_examples[c]
-    found[:], which[:] = 1e18, 0
+    for k in range(count + 1):
+        found[k], which[k] = 1e18, 0
     for e in range(tables.first[h], tables.first[h] + tables.sizes[h]):
-        if not tables.allowed[e]:
+        if not tables.allowed[e] or not low <= tables.styles[e] <= high:
             continue
-        d = distance(tables, state, c, e, found[NEIGHBOURS]) + 1e-9
-        if d >= found[NEIGHBOURS]:
+        d = distance(tables, state, c, e, style, found[count]) + 1e-9
+        if d >= found[count]:
             continue
-        k = NEIGHBOURS
+        k = count
         while k > 0 and found[k - 1] > d:
             found[k], which[k] = found[k - 1], which[k - 1]
             k -= 1
         found[k], which[k] = d, e
     total = 0.0
-    for n in range(NEIGHBOURS):
-        w = 1.0 / found[n] - 1.0 / found[NEIGHBOURS] if found[n] < 1e17 else 0.0
+    for n in range(count):
+        w = 1.0 / found[n] - 1.0 / found[count] if found[n] < 1e17 else 0.0
         if n == 0:
             w = max(w, 1e-12)
-        state.chosen[c, n] = which[n]
-        state.weights[c, n] = w
+        state.chosen[c, slot + n] = which[n]
+        state.weights[c, slot + n] = w
         total += w
-    for n in range(NEIGHBOURS):
+    for n in range(slot, slot + count):
         state.weights[c, n] /= total

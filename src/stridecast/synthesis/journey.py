@@ -15,6 +15,7 @@ from stridecast.model.database import MotionDatabase
 from stridecast.model.motion import Motion
 from stridecast.model.pose import Pose
 from stridecast.steering.force import SteeringGains
+from stridecast.synthesis.styles import Style
 from stridecast.synthesis.walker import Walker
 
 Array = np.ndarray
@@ -103,6 +104,7 @@ def follow(
     frame_rate: float | None = None,
     heading: float | None = None,
     size: str | None = None,
+    style: Style = 0.0,
     progress: Callable[[int, int], None] | None = None,
 ) -> Journey:
     """Let a character walk after a stream of points, frame by frame as it would on-line.
@@ -117,8 +119,8 @@ def follow(
         Where to go.
     heading
         Where it looks at first, radians, if that is to be something else.
-    size
-        Size of movement (see ``Walkers``).
+    size, style
+        Size of movement and style (see ``Walkers``).
     progress
         Called with frames done and frames in all, about once a second of the walk.
     """
@@ -128,7 +130,14 @@ def follow(
         leading = np.flatnonzero(np.linalg.norm(way, axis=-1) > LOOK)
         heading = float(ground.heading(way[leading[0]])) if len(leading) else 0.0
     walker = Walker(
-        database, first, heading, subject=subject, gains=gains, frame_rate=frame_rate, size=size or "neutral"
+        database,
+        first,
+        heading,
+        subject=subject,
+        gains=gains,
+        frame_rate=frame_rate,
+        size=size or "neutral",
+        style=style,
     )
     rate = walker.frame_rate
     times = stream.times[0] + np.arange(int((stream.times[-1] - stream.times[0]) * rate + 1e-6) + 1) / rate

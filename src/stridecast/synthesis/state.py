@@ -40,6 +40,9 @@ class State(NamedTuple):
     made_up: Array  # C, transitions that had no example
     # size of movement
     size: Array  # C 3: share of what exaggerated movements add, how fast it changes, the share wanted
+    # style
+    style: Array  # C, the one wanted, from gloomy (-1) to brisk (+1)
+    stance: Array  # C D, how people of the style shown stand
     # choice of examples
     choice: Array  # C 3, speed, tangential and lateral acceleration that they are chosen by
     # a vehicle that moves by itself
@@ -101,6 +104,8 @@ def make_state(count: int, tables: Tables) -> State:
         "generic": (),
         "started": (),
         "size": (3,),
+        "style": (),
+        "stance": (width,),
         "choice": (3,),
         "turning": (),
         "phase": (),
@@ -138,7 +143,7 @@ def make_state(count: int, tables: Tables) -> State:
     arrays |= {name: np.zeros((count, *shape), np.int64) for name, shape in whole.items()}
     arrays |= {name: np.zeros((count, *shape), bool) for name, shape in flags.items()}
     arrays["fresh"][:] = True
-    arrays["features"][:] = tables.neutral
+    arrays["features"][:] = arrays["stance"][:] = tables.neutral
     arrays["scale"][:] = 1.0
     return State(**arrays)
 

@@ -17,6 +17,7 @@ from stridecast.model.database import MARGIN, MotionDatabase
 from stridecast.model.group import MotionGroup
 from stridecast.model.segment import MOTIONS, RUN, STAND, WALK
 from stridecast.model.skeleton import Skeleton
+from stridecast.synthesis.styles import example_styles, style_ranges
 
 Array = np.ndarray
 
@@ -25,6 +26,9 @@ STOP_TOLERANCE = 0.45
 
 MOST_KEYS = 8
 """No string has more changes of support than this."""
+
+FEWEST_RESTS = 6
+"""Fewer starts and stops than this do not tell how people stand in a mood."""
 
 
 class Tables(NamedTuple):
@@ -38,6 +42,7 @@ class Tables(NamedTuple):
     parameters: Array  # E 3, speed at the first frame, mean tangential and lateral acceleration
     durations: Array  # E
     allowed: Array  # E, of the chosen subjects
+    styles: Array  # E, from gloomy (-1) to brisk (+1)
     # groups
     first: Array  # G
     sizes: Array  # G
@@ -51,6 +56,7 @@ class Tables(NamedTuple):
     from_rest: Array  # G, begins in standing
     to_rest: Array  # G, ends in it
     entry_speed: Array  # G 2
+    style_range: Array  # G 2, of its allowed examples
     jerk: Array  # G
     later_jerk: Array  # G, of the motion a group leads to if that is less
     tangential: Array  # G 2 2, first and last frame, low and high
@@ -70,6 +76,8 @@ class Tables(NamedTuple):
     fastest: float
     run_from: float  # slowest running, m/s
     walk_to: float  # fastest walking
+    stances: Array  # 3 D, how gloomy, neutral and brisk people stand
+    stance_styles: Array  # 3, how gloomy and brisk they are
     home: Array  # 2 2, toe joints under a standing body, left and ahead of the vehicle
     # pose
     neutral: Array  # D, how people stand who are about to go or have just come
@@ -94,7 +102,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         Nobody of that name is in the database, or none of their motions can be walked with.
     """
     examples, groups = database.examples, database.groups
-    allowed = _allowed(database, subject)
+    allowed, styles = _allowed(database, subject), example_styles(database)
     usable = np.array([bool(allowed[g.rows].any()) for g in groups])
     graph = connect(groups, usable)
     motions = [m for m in MOTIONS if any(u and g.motion == m for u, g in zip(usable, groups, strict=True))]
@@ -104,7 +112,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
     labels = sorted({g.motion for g in groups})
     skeleton = database.skeleton
     entry = np.array([_entry_speed(g, examples.parameters[g.rows][allowed[g.rows], 0]) for g in groups])
-    neutral = _neutral(database, allowed)
+    stances, stance_styles = _stances(database, allowed, styles)
     step_off, step_off_at = _step_off(groups, usable)
     return Tables(
         features=examples.features,
@@ -114,6 +122,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         parameters=_parameters(database),
         durations=examples.durations,
         allowed=allowed,
+        styles=styles,
         first=np.array([g.first for g in groups]),
         sizes=np.where(usable, [g.count for g in groups], 0),
         comes_from=np.array([MOTIONS.index(g.comes_from) for g in groups]),
@@ -126,6 +135,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         from_rest=np.array([g.start == "S" for g in groups]),
         to_rest=np.array([g.stop == "S" for g in groups]),
         entry_speed=entry,
+        style_range=style_ranges(styles, allowed, [g.rows for g in groups]),
         jerk=np.array([g.bounds.jerk for g in groups]),
         later_jerk=np.array([_later_jerk(g, groups) for g in groups]),
         tangential=np.array([g.bounds.tangential for g in groups]),
@@ -152,8 +162,10 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         walk_to=max(
             (e[1] for e, g, u in zip(entry, groups, usable, strict=True) if u and g.motion == WALK), default=2.0
         ),
-        home=_home(database, neutral),
-        neutral=neutral,
+        stances=stances,
+        stance_styles=stance_styles,
+        home=_home(database, stances[1]),
+        neutral=stances[1],
         references=database.references,
         feature_weights=_feature_weights(skeleton),
         parents=np.array(skeleton.parents),
@@ -240,18 +252,43 @@ def _approach(groups: tuple[MotionGroup, ...], entry: Array, graph: TransitionGr
     return out
 
 
-def _neutral(database: MotionDatabase, allowed: Array) -> Array:
-    """Features to begin with: of those who start or stop; some of those who only stand do something else."""
+def _stances(database: MotionDatabase, allowed: Array, styles: Array) -> tuple[Array, Array]:
+    """Features of gloomy, neutral and brisk people who stand, and their styles.
+
+    They are those of who starts or stops: some of those who only stand do something else. Where few did in a mood,
+    people stand in it as usual.
+    """
     features = database.examples.features
-    found = []
+    usual = allowed & (styles == 0.0)
+    usual = usual if usual.any() else allowed
+    neutral = _rests(database, usual)
+    if len(neutral) == 0:
+        neutral = _frames(np.flatnonzero(usual), MARGIN)
+    gloomy, brisk = (_rests(database, allowed & mood) for mood in (styles < 0.0, styles > 0.0))
+    found = [rests if len(rests) >= FEWEST_RESTS else neutral for rests in (gloomy, neutral, brisk)]
+    stances = np.array([features[rests[:, 0], rests[:, 1]].mean(axis=0) for rests in found])
+    # Who changes the mood on the spot keeps the feet where they are: all stand above the same place.
+    feet = np.array([_home(database, stance).mean(axis=0) for stance in stances])
+    root = 3 * (database.skeleton.joints - 1) + 3
+    stances[:, [root, root + 2]] += feet[1] - feet
+    return stances, np.array([styles[rests[:, 0]].mean() for rests in found])
+
+
+def _rests(database: MotionDatabase, allowed: Array) -> Array:
+    """Examples and rows in which who starts still stands, or who stops has come to stand."""
+    last = database.examples.features.shape[1] - 1 - MARGIN
+    found = [np.zeros((0, 2), np.int64)]
     for group in database.groups:
-        own = features[group.rows][allowed[group.rows]]
+        own = np.flatnonzero(allowed[group.rows]) + group.first
         if group.comes_from == STAND != group.leads_to:
-            found.append(own[:, MARGIN])
+            found.append(_frames(own, MARGIN))
         elif group.leads_to == STAND != group.comes_from:
-            found.append(own[:, -1 - MARGIN])
-    found = [f for f in found if len(f)] or [features[allowed][:, MARGIN]]
-    return np.concatenate(found).mean(axis=0)
+            found.append(_frames(own, last))
+    return np.concatenate(found)
+
+
+def _frames(examples: Array, row: int) -> Array:
+    return np.stack((examples, np.full(len(examples), row)), axis=-1)
 
 
 def _goes(group: MotionGroup) -> bool:
@@ -288,13 +325,13 @@ def _swings(group: MotionGroup) -> float:
     return float(sum(length for length, state in zip(lengths, group.string, strict=True) if state not in "DS"))
 
 
-def _home(database: MotionDatabase, neutral: Array) -> Array:
-    """Where the toes are under somebody who stands neutrally: left and ahead of the vehicle."""
+def _home(database: MotionDatabase, stance: Array) -> Array:
+    """Where the toes are under somebody who stands so: left and ahead of the vehicle."""
     skeleton = database.skeleton
     tilt = 3 * (skeleton.joints - 1)
-    root = quat.multiply(quat.about_y(neutral[tilt + 6]), quat.exp(neutral[tilt : tilt + 3]))
-    joints = quat.multiply(database.references, quat.exp(neutral[:tilt].reshape(-1, 3)))
-    world = kinematics.forward(skeleton, neutral[tilt + 3 : tilt + 6], np.concatenate((root[None], joints)))
+    root = quat.multiply(quat.about_y(stance[tilt + 6]), quat.exp(stance[tilt : tilt + 3]))
+    joints = quat.multiply(database.references, quat.exp(stance[:tilt].reshape(-1, 3)))
+    world = kinematics.forward(skeleton, stance[tilt + 3 : tilt + 6], np.concatenate((root[None], joints)))
     return world.positions[[skeleton.joint(f"{side}_toe") for side in SIDES]][:, [0, 2]]
 
 

@@ -13,14 +13,15 @@ from stridecast.errors import InputError, WishError
 from stridecast.geometry.kernels import is_compiled
 from stridecast.model.database import MotionDatabase
 from stridecast.model.pose import BoundsInForce, Pose, VehicleState
-from stridecast.model.scene import SIZES
 from stridecast.model.segment import MOTIONS
 from stridecast.steering.force import SteeringGains
 from stridecast.steering.kernels import JERK, LATERAL, SPEED, TANGENTIAL
-from stridecast.synthesis.sizes import AMOUNTS, enlargement
+from stridecast.synthesis.sizes import enlargement
 from stridecast.synthesis.state import make_state
-from stridecast.synthesis.step_kernels import FORCE, GIVEN, PLAN, POINT, Given, step_block
+from stridecast.synthesis.step_kernels import GIVEN, PLAN, POINT, Given, step_block
+from stridecast.synthesis.styles import Style, style_numbers
 from stridecast.synthesis.tables import make_tables
+from stridecast.synthesis.wishes import Wish, WishReader, newcomers, single, size_amounts
 
 Array = np.ndarray
 log = logging.getLogger("stridecast")
@@ -36,12 +37,6 @@ _NAMES = tuple(
 
 BLOCK = 64
 """Characters a thread steps at a time."""
-
-LONGEST_STEP = 0.2
-"""Nobody is stepped by more than this at a time, seconds."""
-
-FARTHEST = 1e6
-"""A point further from the origin than this is a mistake, metres."""
 
 
 class Walkers:
@@ -63,13 +58,15 @@ class Walkers:
         Frames a second; the database's if left out.
     threads
         Threads that share the characters. The result does not depend on it.
-    size
-        Size of movement to begin with (see ``step``).
+    size, style
+        Size of movement and style to begin with (see ``step``).
 
     Raises
     ------
     InputError
         Places or headings that are no finite numbers, a frame rate outside 10 to 240 Hz.
+    WishError
+        An unknown size or style.
     DatabaseError
         Nobody called ``subject``.
     """
@@ -85,6 +82,7 @@ class Walkers:
         frame_rate: float | None = None,
         threads: int = 1,
         size: str | Sequence[str] = "neutral",
+        style: Style | Sequence[Style] | Float[Array, "characters"] = 0.0,
     ) -> None:
         places = np.array(positions, np.float64)
         if places.ndim != 2 or places.shape[1] != 2 or len(places) == 0:
@@ -122,7 +120,9 @@ class Walkers:
         self._active = np.ones(len(places), bool)
         self._steps = np.full(len(places), 1.0 / rate)
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
-        self._set_sizes(self._sizes_of(size))
+        self._reader = WishReader(len(places), rate, self._motions)
+        self._set_sizes(size_amounts(size, len(places)))
+        self._state.style[:] = style_numbers(style, len(places))
 
     def __len__(self) -> int:
         return len(self._wanted)
@@ -145,6 +145,7 @@ class Walkers:
         *,
         phase: Float[Array, "rows"] | float = 0.0,
         size: str | Sequence[str] = "neutral",
+        style: Style | Sequence[Style] | Float[Array, "rows"] = 0.0,
     ) -> None:
         """Put new people into rows; nothing is left there of who was in them before.
 
@@ -159,47 +160,29 @@ class Walkers:
         phase
             Where in their gait those are who appear in motion, from 0 to below 1: the half cycle of the left foot
             begins at 0, that of the right foot at 0.5.
-        size
-            Size of movement (see ``step``).
+        size, style
+            Size of movement and style (see ``step``).
 
         Raises
         ------
         InputError
             Rows that are not there or come twice, places that are no finite numbers, a phase outside 0 to 1.
         WishError
-            An unknown size. Nothing has changed then.
+            An unknown size or style. Nothing has changed then.
         """
-        which = np.asarray(rows)
-        if which.ndim != 1 or (which.size and which.dtype.kind not in "iu"):
-            raise InputError("rows must be a list of whole numbers")
-        which = which.astype(np.int64)
-        outside = which[(which < 0) | (which >= len(self))]
-        if len(outside):
-            raise InputError(f"there is no row {outside[0]}; rows are 0 to {len(self) - 1}")
-        if len(np.unique(which)) != len(which):
-            raise InputError("a row can be filled once at a time; one comes twice")
-        places = np.asarray(positions, np.float64)
-        if places.shape != (len(which), 2):
-            raise InputError(f"positions must have shape {(len(which), 2)}, not {places.shape}")
-        looks, phases = np.asarray(headings, np.float64), np.asarray(phase, np.float64)
-        for name, values in (("headings", looks), ("phase", phases)):
-            if values.shape not in ((), (len(which),)):
-                raise InputError(f"{name} must be one number or one for each of {len(which)} rows")
-        if not (np.isfinite(places).all() and np.isfinite(looks).all()):
-            raise InputError("positions and headings must be finite numbers")
-        if not ((phases >= 0.0) & (phases < 1.0)).all():
-            raise InputError("a phase lies between 0 and 1, without 1")
-        sizes = self._sizes_of(size, len(which))
+        new = newcomers(rows, positions, headings, phase, len(self))
+        sizes, styles = size_amounts(size, len(new.rows)), style_numbers(style, len(new.rows))
         self._enlarge_if(sizes)
-        self._made_up_before += int(self._state.made_up[which].sum())
+        self._made_up_before += int(self._state.made_up[new.rows].sum())
         for field, blank in zip(self._state, self._blank, strict=True):
-            field[which] = blank[0]
-        self._state.position[which] = places
-        self._state.heading[which] = looks
-        self._state.phase[which] = phases
-        self._state.size[which, 2] = sizes
-        self._points[which] = places
-        self._forces[which] = 0.0
+            field[new.rows] = blank[0]
+        self._state.position[new.rows] = new.places
+        self._state.heading[new.rows] = new.headings
+        self._state.phase[new.rows] = new.phases
+        self._state.size[new.rows, 2] = sizes
+        self._state.style[new.rows] = styles
+        self._points[new.rows] = new.places
+        self._forces[new.rows] = 0.0
 
     def step(
         self,
@@ -210,6 +193,7 @@ class Walkers:
         rests_in: Float[Array, "characters"] | float = np.inf,
         motion: str | Sequence[str] | Int[Array, "characters"] = "walk",
         size: str | Sequence[str] | None = None,
+        style: Style | Sequence[Style] | Float[Array, "characters"] | None = None,
         vehicles: VehicleState | None = None,
         active: Bool[Array, "characters"] | None = None,
         dt: Float[Array, "characters"] | float | None = None,
@@ -234,6 +218,10 @@ class Walkers:
         size
             How large movements are: ``calm``, ``neutral``, ``lively`` or ``exaggerated``, one for all or one each; as
             before if left out. It changes smoothly, in about half a second.
+        style
+            In what mood to go: a number from -1 (gloomy) to 1 (brisk), or ``gloomy``, ``neutral``, ``brisk``, one for
+            all or one each; as before if left out. It acts from the next half cycle on, as far as the database shows
+            it: examples are chosen by it too.
         vehicles
             Instead of points: vehicles that move by themselves, a row each, at any speed, also turning on the spot.
             They are shown as given, and the bodies follow: smaller and slower steps below the slowest walk of the
@@ -249,142 +237,31 @@ class Walkers:
         ------
         WishError
             Not exactly one of points, forces, accelerations and vehicles, wrong shape, numbers that are not finite, an
-            unknown motion or size. Nothing has changed then.
+            unknown motion, size or style. Nothing has changed then.
         """
-        sizes = None if size is None else self._sizes_of(size)
-        self._take_wish(points, forces, accelerations, vehicles, rests_in, motion, active, dt)
+        wish = self._reader.read(points, forces, accelerations, vehicles, rests_in, motion, active, dt)
+        sizes = None if size is None else size_amounts(size, len(self))
+        styles = None if style is None else style_numbers(style, len(self), wish.active)
+        self._take(wish)
         if sizes is not None:
             self._set_sizes(sizes)
+        if styles is not None:
+            self._state.style[wish.active] = styles[wish.active]
         self._advance()
         return self._pose()
 
-    def _take_wish(
-        self,
-        points: Array | None,
-        forces: Array | None,
-        accelerations: Array | None,
-        vehicles: VehicleState | None,
-        rests_in: Array | float,
-        motion: str | Sequence[str] | Array,
-        active: Array | None,
-        dt: Array | float | None,
-    ) -> None:
-        """Check a wish whole before any of it is stored."""
-        given = [
-            (kind, name, wish)
-            for kind, name, wish in (
-                (POINT, "points", points),
-                (FORCE, "forces", forces),
-                (PLAN, "accelerations", accelerations),
-                (GIVEN, "vehicles", vehicles),
-            )
-            if wish is not None
-        ]
-        if len(given) != 1:
-            raise WishError("give one of points, forces and accelerations, or vehicles")
-        kind, name, given_wish = given[0]
-        stepped = self._who(active)
-        moved, wish = self._given, self._points
-        if vehicles is not None:
-            moved = self._vehicles(vehicles, stepped)
-        else:
-            wish = self._numbers(name, given_wish, self._points.shape, stepped)
-            if np.abs(wish[stepped]).max(initial=0.0) > FARTHEST:
-                raise WishError(f"the wish lies further than {FARTHEST:.0e} from the origin")
-        rests = np.asarray(rests_in, np.float64)
-        if rests.shape not in ((), (len(self),)):
-            raise WishError("rests_in must be seconds from 0, one for all or one each")
-        rests = np.broadcast_to(rests, (len(self),))
-        if not (rests[stepped] >= 0).all():
-            raise WishError("rests_in must be seconds from 0, one for all or one each")
-        wanted = self._numbers_of(motion, stepped)
-        steps = self._steps_of(dt, stepped)
+    def _take(self, wish: Wish) -> None:
+        """Store a wish that was found right."""
+        stepped = wish.active
         self._active[:] = stepped
-        self._steps[:] = steps
-        self._given = moved
-        self._wanted[stepped] = wanted[stepped]
-        self._kind[stepped] = kind
-        self._rests_in[stepped] = rests[stepped] if kind in (PLAN, GIVEN) else np.inf
-        if kind != GIVEN:
-            (self._points if kind == POINT else self._forces)[stepped] = wish[stepped]
-
-    def _who(self, active: Array | None) -> Array:
-        if active is None:
-            return np.ones(len(self), bool)
-        stepped = np.asarray(active)
-        if stepped.shape != (len(self),) or stepped.dtype != bool:
-            raise WishError(f"active must be {len(self)} truth values, not {stepped.dtype} of shape {stepped.shape}")
-        return stepped
-
-    def _numbers(self, name: str, wish: object, shape: tuple[int, ...], stepped: Array) -> Array:
-        """Numbers of a wish as an array of a shape, finite for those who are stepped."""
-        try:
-            numbers = np.ascontiguousarray(wish, np.float64)
-            if not numbers.flags.writeable:  # to compiled code a type of its own
-                numbers = numbers.copy()
-        except (TypeError, ValueError):
-            raise WishError(f"{name} must be numbers of shape {shape}") from None
-        if numbers.shape != shape:
-            raise WishError(f"{name} must have shape {shape}, not {numbers.shape}")
-        fine = np.isfinite(numbers).reshape(len(self), -1).all(axis=1) | ~stepped
-        if not fine.all():
-            row = int(np.flatnonzero(~fine)[0])
-            raise WishError(f"the wish of character {row} is {numbers[row].tolist()}: finite numbers are wanted")
-        return numbers
-
-    def _vehicles(self, vehicles: VehicleState, stepped: Array) -> Given:
-        given = Given(
-            *(
-                self._numbers(f"vehicles.{name}", getattr(vehicles, name), shape, stepped)
-                for name, shape in (
-                    ("position", self._points.shape),
-                    ("velocity", self._points.shape),
-                    ("acceleration", self._points.shape),
-                    ("heading", (len(self),)),
-                )
-            )
-        )
-        if np.abs(given.position[stepped]).max(initial=0.0) > FARTHEST:
-            raise WishError(f"a vehicle lies further than {FARTHEST:.0e} from the origin")
-        return given
-
-    def _numbers_of(self, motion: str | Sequence[str] | Array, stepped: Array) -> Array:
-        """Numbers of the motions asked for."""
-        if isinstance(motion, str):
-            return np.full(len(self), self._number_of(motion))
-        if len(motion) != len(self):
-            raise WishError(f"{len(motion)} motions for {len(self)} characters")
-        if isinstance(motion, np.ndarray) and motion.dtype.kind in "iu":
-            known = np.isin(motion, list(self._motions.values())) | ~stepped
-            if not known.all():
-                wrong = motion[~known][0]
-                there = ", ".join(f"{number} ({name})" for name, number in self._motions.items())
-                raise WishError(f"there is no motion {wrong}; there are {there}")
-            return motion.astype(np.int64)
-        return np.array([self._number_of(name) for name in motion])
-
-    def _steps_of(self, dt: Array | float | None, stepped: Array) -> Array:
-        """Seconds of everybody's step."""
-        if dt is None:
-            return np.full(len(self), 1.0 / self.frame_rate)
-        steps = np.asarray(dt, np.float64)
-        if steps.shape not in ((), (len(self),)):
-            raise WishError(f"dt must be seconds, one for all or one each of {len(self)}")
-        steps = np.broadcast_to(steps, (len(self),))
-        if not ((steps[stepped] > 0.0) & (steps[stepped] <= LONGEST_STEP)).all():
-            raise WishError(f"a step takes more than 0 and at most {LONGEST_STEP} seconds")
-        return steps
-
-    def _sizes_of(self, size: str | Sequence[str], count: int | None = None) -> list[float]:
-        count = len(self) if count is None else count
-        names = [size] * count if isinstance(size, str) else list(size)
-        if len(names) != count:
-            raise WishError(f"{len(names)} sizes for {count} characters")
-        try:
-            return [AMOUNTS[name] for name in names]
-        except (KeyError, TypeError):
-            wrong = next(name for name in names if name not in SIZES)
-            raise WishError(f"there is no size {wrong!r} of movement; there are {', '.join(SIZES)}") from None
+        self._steps[:] = wish.steps
+        self._wanted[stepped] = wish.motions[stepped]
+        self._kind[stepped] = wish.kind
+        self._rests_in[stepped] = wish.rests_in[stepped] if wish.kind in (PLAN, GIVEN) else np.inf
+        if isinstance(wish.what, Given):
+            self._given = wish.what
+        else:
+            (self._points if wish.kind == POINT else self._forces)[stepped] = wish.what[stepped]
 
     def _set_sizes(self, sizes: list[float]) -> None:
         """Take sizes over; the first that is not neutral costs a second or two."""
@@ -395,15 +272,9 @@ class Walkers:
         if any(sizes) and not len(self._tables.larger):
             self._tables = self._tables._replace(larger=enlargement(self.database).astype(np.float32))
 
-    def _number_of(self, motion: str) -> int:
-        try:
-            return self._motions[motion]
-        except (KeyError, TypeError):
-            raise WishError(f"there is no motion {motion!r}; there are {', '.join(self._motions)}") from None
-
     def _advance(self) -> None:
         if not step_block.signatures and not is_compiled(step_block):
-            log.warning("compiling the walker, once for this machine and version: this takes half a minute")
+            log.warning("compiling the walker, once for this machine and version: this takes a minute or two")
         run = [self._block(a, min(a + BLOCK, len(self))) for a in range(0, len(self), BLOCK)]
         if self._pool is None or len(run) == 1:
             for arguments in run:
@@ -475,12 +346,20 @@ class Walker:
         gains: SteeringGains | None = None,
         frame_rate: float | None = None,
         size: str = "neutral",
+        style: Style = 0.0,
     ) -> None:
         place = np.asarray(position, np.float64)
         if place.shape != (2,):
             raise InputError(f"a position is a ground point (x, z), not an array of shape {place.shape}")
         self._batch = Walkers(
-            database, place[None], float(heading), subject=subject, gains=gains, frame_rate=frame_rate, size=size
+            database,
+            place[None],
+            float(heading),
+            subject=subject,
+            gains=gains,
+            frame_rate=frame_rate,
+            size=size,
+            style=style,
         )
 
     @property
@@ -517,6 +396,7 @@ class Walker:
         rests_in: float = np.inf,
         motion: str = "walk",
         size: str | None = None,
+        style: Style | None = None,
     ) -> Pose:
         """Advance by one frame to a ground point ``(x, z)``, by a force on a unit mass or as a plan wants (m/s2).
 
@@ -530,12 +410,13 @@ class Walker:
         if not isinstance(motion, str):
             raise WishError(f"a motion is one of {', '.join(self.motions)}, not {motion!r}")
         pose = self._batch.step(
-            _row(point),
-            forces=_row(force),
-            accelerations=_row(acceleration),
+            single(point),
+            forces=single(force),
+            accelerations=single(acceleration),
             rests_in=rests_in,
             motion=motion,
             size=size,
+            style=style,
         )
         v, b = pose.vehicle, pose.bounds
         return Pose(
@@ -558,16 +439,3 @@ class Walker:
                 speed=b.speed[0],
             ),
         )
-
-
-def _row(wish: object) -> Array | None:
-    """One wish as a batch of one."""
-    if wish is None:
-        return None
-    try:
-        row = np.asarray(wish, np.float64)
-    except (TypeError, ValueError):
-        raise WishError(f"a wish is two numbers (x, z), not {wish!r}") from None
-    if row.shape != (2,):
-        raise WishError(f"a wish is two numbers (x, z), not an array of shape {row.shape}")
-    return row[None]
