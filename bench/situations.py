@@ -99,14 +99,16 @@ def run(task: Task, database: MotionDatabase) -> Row:
         "seed": task.seed,
         "people": len(people),
         "arrived": len(crowd.left),
-        "left_over": len(people) - len(crowd.left) + crowd.waiting,
+        "left_over": len(people) - len(crowd.left) + crowd.waiting
+        if judged_ways
+        else 0,  # nobody has to leave the ring
         "deadlocks": len(score.deadlocks),
         "overlaps": score.overlaps.pairs,
         "overlap_depth": score.overlaps.depth,
         "solid_overlaps": score.solid_overlaps.pairs,
         "violations": {kind: found.count for kind, found in beyond.items()},
-        "against_alone": score.travel.against_alone.tolist(),
-        "detour": score.travel.detours.tolist(),
+        "against_alone": score.travel.against_alone.tolist() if judged_ways else [],
+        "detour": score.travel.detours.tolist() if judged_ways else [],
         "mean_speed": float(moved),
         "weidmann": None if task.density is None else float(weidmann(np.array(task.density))),
         "acceleration_99": score.smoothness.acceleration_99,
@@ -231,7 +233,7 @@ def main() -> int:
             task, row = waiting[done], done.result()
             rows[task] = row
             left = (time.perf_counter() - begun) / len(rows) * (len(todo) - len(rows))
-            told = row.get("error") or (f"{row['left_over']} left" if row["left_over"] and task.density is None else "")
+            told = row.get("error") or (f"{row['left_over']} left" if row["left_over"] else "")
             if told or sys.stderr.isatty() or len(rows) % max(len(todo) // 20, 1) == 0:
                 what = f"{task.title}, seed {task.seed}: {told or 'done'}"
                 print(f"{len(rows)} of {len(todo)}, about {left:.0f} s more; {what}", file=sys.stderr, flush=True)
