@@ -13,7 +13,7 @@ import numpy as np
 from stridecast.crowd.ground_kernels import disc_way, free_way
 from stridecast.crowd.neighbour_kernels import BX, BZ, EX, EZ, FELLOW, HX, HZ, JAMMED, PX, PZ, RADIUS, ROW, VX, VZ
 from stridecast.crowd.rule_kernels import contact_time
-from stridecast.crowd.rules import GO_FIRST, GO_ON
+from stridecast.crowd.rules import GO_FIRST, GO_ON, ON_THE_WAY, RETURN
 from stridecast.crowd.state import Ground, Moving, People
 from stridecast.geometry.kernels import kernel
 
@@ -86,6 +86,9 @@ TURN = 0.15
 SIDE = 0.35
 """Price of the wrong side."""
 
+TURNING, TURNING_AMONG_OTHERS = 0.02, 0.1
+"""Price of another direction, a radian of it: alone, and where others are in the way, lest people waver."""
+
 CHANGE = 0.2
 """Price of changing one's mind."""
 
@@ -129,6 +132,7 @@ def weigh(
     out = moving.opposed[c]
     aim = math.hypot(moving.target[c, 0], moving.target[c, 1])
     still = aim > 0.0 and math.hypot(moving.velocity[c, 0], moving.velocity[c, 1]) < 0.3
+    firmly = TURNING if rule in (ON_THE_WAY, RETURN) else TURNING_AMONG_OTHERS
     radius, keep = people.radius[c], min(people.keep[c], 0.5)
     n = 0
     for a in range(len(ANGLES) + 1):
@@ -160,6 +164,8 @@ def weigh(
         wrong = (1.0 - abs(drift)) * SIDE * max(-side * sine, 0.0) - KEEP * drift * sine
         if side != 0.0 and a == 0:
             wrong = 0.25 * (1.0 - abs(drift)) * SIDE
+        if aim > 0.0:
+            wrong += firmly * math.hypot(ax - moving.target[c, 0] / aim, az - moving.target[c, 1] / aim)
         if still:
             wrong += TURN * (1.0 - (ax * moving.target[c, 0] + az * moving.target[c, 1]) / aim)
         for s in range(len(SHARES)):

@@ -25,7 +25,7 @@ from stridecast.geometry.kernels import is_compiled
 from stridecast.model.database import MotionDatabase
 from stridecast.model.people import Mover, Person
 from stridecast.model.pose import VehicleState
-from stridecast.model.scene import Scene
+from stridecast.model.scene import Circle, Scene
 from stridecast.model.segment import RUN
 from stridecast.model.skeleton import Skeleton
 
@@ -147,7 +147,7 @@ class Crowd:
         self.bounds = HumanBounds.of(database)
         self._population = Population(scene, seed=self.seed, frame_rate=rate)
         self._coming = iter(self._population)
-        self._routes = Routes(scene, self._population.solids)
+        self._routes = Routes(scene, self._standing())
         self._traffic = Traffic(
             make_limits(self.bounds), ground_of(scene, self._population.solids), rate, seed=self.seed, threads=threads
         )
@@ -164,6 +164,11 @@ class Crowd:
             log.warning("compiling the crowd, once for this machine and version: this takes a minute")
         self._movers = [self._add_mover(mover) for mover in scene.movers]
         self._let_in(progress)
+
+    def _standing(self) -> list[Circle]:
+        """People who stand about from the beginning on, as what others' ways go round."""
+        stand = [p for due in self._population.until(0.0) for p in due.people if not p.stops]
+        return [Circle(name=f"{p.name} who stands", center=p.start, radius=p.behavior.body_radius) for p in stand]
 
     @property
     def time(self) -> float:

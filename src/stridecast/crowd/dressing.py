@@ -270,6 +270,7 @@ def _motions(
         phases=np.array([_phase(track.person) for track in tracks]),
         heights=np.array([heights.get(track.person, bodies.height) for track in tracks]),
         sizes=["neutral"] * count,
+        styles=np.zeros(count),
     )
     roots = np.zeros((count, longest, 3))
     rotations = np.zeros((count, longest, joints, 4), np.float32)

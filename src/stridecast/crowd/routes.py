@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,9 @@ import shapely
 from jaxtyping import Float
 
 from stridecast.crowd.population import task_of
+from stridecast.errors import PathError, SceneError
 from stridecast.model.people import Person
-from stridecast.model.scene import Scene
+from stridecast.model.scene import Circle, Scene
 from stridecast.paths.generate import generate_path
 from stridecast.paths.solids import Solids
 
@@ -27,10 +29,12 @@ NEAREST = 0.3
 
 
 class Routes:
-    """Finds ways through a scene (see ``generate_path``)."""
+    """Finds ways through a scene (see ``generate_path``), round those who stand about where that is possible."""
 
-    def __init__(self, scene: Scene, solids: Solids) -> None:
-        self.scene, self.solids = scene, solids
+    def __init__(self, scene: Scene, standing: Sequence[Circle] = ()) -> None:
+        self.scene = scene
+        self.crowded = replace(scene, obstacles=(*scene.obstacles, *standing)) if standing else scene
+        self.solids = Solids(self.crowded)
         self._known: dict[tuple[object, ...], Array] = {}
 
     def way_of(self, person: Person) -> Float[Array, "points 2"]:
@@ -61,7 +65,12 @@ class Routes:
 
     def find(self, person: Person) -> Float[Array, "points 2"]:
         """A way of one's own."""
-        curve = generate_path(task_of(self.scene, person)).curve
+        try:
+            curve = generate_path(task_of(self.crowded, person)).curve
+        except (PathError, SceneError):
+            if self.crowded is self.scene:
+                raise
+            curve = generate_path(task_of(self.scene, person)).curve
         count = max(int(np.ceil(curve.length / STEP)), 1) + 1
         return curve.at(np.linspace(0.0, curve.length, count)).point
 

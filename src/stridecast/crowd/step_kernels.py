@@ -41,6 +41,12 @@ REACH = 5.0
 DECIDES = 0.1
 """Everybody decides anew about so often, seconds."""
 
+CHANGING = 0.8
+"""The direction that is aimed at changes no faster than this, rad/s, lest people waver, ..."""
+
+URGENT, UNHURRIED = 0.8, 0.3
+"""... unless they would meet somebody within this, seconds, or hardly move, m/s."""
+
 TRIES = 8
 """So many velocities are tried, the best first, until one leaves room to stop."""
 
@@ -65,6 +71,9 @@ CONTRARY = 0.1
 
 GOING_ROUND = 3.0
 """... and the others go round the jam, for about so long, seconds."""
+
+CONE = 0.6
+"""Who is within this cosine of the direction wished for is in front."""
 
 OPPOSED = -0.3
 """Whose ways lead apart by more than this (cosine) are in each other's way."""
@@ -168,27 +177,18 @@ def propose(
             costs,
         )
         moving.free[c] = False
-        for _ in range(TRIES):
+        for n in range(TRIES):
             best = cheapest(costs)
             if not costs[best] < np.inf:
                 break
-            if try_target(
-                people,
-                moving,
-                ground,
-                limits,
-                cells,
-                farthest,
-                widest,
-                things,
-                standing,
-                c,
-                targets[best, 0],
-                targets[best, 1],
-                dt,
-            ):
-                moving.target[c, 0], moving.target[c, 1] = targets[best, 0], targets[best, 1]
+            ux, uz = targets[best, 0], targets[best, 1]
+            if n == 0:  # first gradually
+                ux, uz = gradual(moving, c, ux, uz, every * dt)
+            if try_target(people, moving, ground, limits, cells, farthest, widest, things, standing, c, ux, uz, dt):
+                moving.target[c, 0], moving.target[c, 1] = ux, uz
                 break
+            if n == 0 and (ux != targets[best, 0] or uz != targets[best, 1]):
+                continue  # there is no room for a gradual turn: at once then
             same = best - best % len(SHARES) if best < CHOICES - 1 else best
             if moving.velocity[c, 0] == 0.0 and moving.velocity[c, 1] == 0.0:
                 costs[same : same + len(SHARES)] = np.inf  # from rest the first step is the same at any speed
@@ -196,6 +196,22 @@ def propose(
         if not moving.free[c]:
             moving.target[c] = 0.0
             moving.held[c] = True
+
+
+@kernel
+def gradual(moving: Moving, c: int, ux: float, uz: float, elapsed: float) -> tuple[float, float]:
+    """A new velocity to aim at, no further round from the one before than one turns to gradually; if there is time."""
+    wish, aim = math.hypot(ux, uz), math.hypot(moving.target[c, 0], moving.target[c, 1])
+    speed = math.hypot(moving.velocity[c, 0], moving.velocity[c, 1])
+    if moving.contact[c] < URGENT or speed < UNHURRIED or wish < REST or aim < REST:
+        return ux, uz
+    tx, tz = moving.target[c, 0] / aim, moving.target[c, 1] / aim
+    angle = math.atan2(ux * tz - uz * tx, ux * tx + uz * tz)
+    most = CHANGING * elapsed
+    if abs(angle) <= most:
+        return ux, uz
+    sine, cosine = math.sin(math.copysign(most, angle)), math.cos(most)
+    return wish * (tx * cosine + tz * sine), wish * (tz * cosine - tx * sine)
 
 
 @kernel
@@ -255,16 +271,13 @@ def decide(
             moving.stuck[c] = max(moving.stuck[c] - 2.0 * elapsed, 0.0) if rule != WAIT else moving.stuck[c]
         luck = mixed(people.number[c], frame, seed)
         patience = (0.6 if people.waits[c] else 1.0) * PATIENCE * (1.0 + 2.0 * people.rank[c])
-        m = blocker(people, seen, count, c, dx, dz)
-        if m >= 0 and moving.stuck[c] > STUCK:
-            o = seen[m]
-            opposed = o[BX] * moving.bound[c, 0] + o[BZ] * moving.bound[c, 1] < OPPOSED
-            moving.opposed[c] = opposed
-            moving.jammed_next[c] = o[JAMMED] > 0.0 or moving.opposed[c]
-            if not (moving.jammed_next[c] or opposed):
+        if moving.stuck[c] > STUCK:
+            gap, moving.opposed[c], jammed = in_front(moving, seen, count, c, people.radius[c], dx, dz)
+            moving.jammed_next[c] = jammed or moving.opposed[c]
+            if not moving.jammed_next[c]:
                 patience *= QUEUING
-            elif moving.jammed_next[c]:
-                narrow = math.hypot(o[PX], o[PZ]) - people.radius[c] - o[RADIUS] < ROOM
+            else:
+                narrow = gap < ROOM
                 back = narrow and luck < STEPPING_BACK and room_in(seen, count, people.radius[c], -dx, -dz) > ROOM
                 if back:
                     dx, dz = -dx, -dz
@@ -309,16 +322,20 @@ def decide(
 
 
 @kernel
-def blocker(people: People, seen: np.ndarray, count: int, c: int, dx: float, dz: float) -> int:
-    """Who is nearest in front, right in the way; -1 if nobody is."""
-    best, which = BLOCKED, -1
+def in_front(
+    moving: Moving, seen: np.ndarray, count: int, c: int, radius: float, dx: float, dz: float
+) -> tuple[float, bool, bool]:
+    """Gap to the nearest one in front, whether somebody there wants to go elsewhere, whether somebody is jammed."""
+    nearest, opposed, jammed = BLOCKED, False, False
     for m in range(count):
         o = seen[m]
-        along, off = o[PX] * dx + o[PZ] * dz, o[PX] * dz - o[PZ] * dx
-        gap = math.hypot(o[PX], o[PZ]) - people.radius[c] - o[RADIUS]
-        if along > 0.0 and abs(off) < people.radius[c] + o[RADIUS] and gap < best:
-            best, which = gap, m
-    return which
+        away = math.hypot(o[PX], o[PZ])
+        gap = away - radius - o[RADIUS]
+        if gap < BLOCKED and o[PX] * dx + o[PZ] * dz > CONE * away:
+            nearest = min(nearest, gap)
+            opposed = opposed or o[BX] * moving.bound[c, 0] + o[BZ] * moving.bound[c, 1] < OPPOSED
+            jammed = jammed or o[JAMMED] > 0.0
+    return nearest, opposed, jammed
 
 
 @kernel

@@ -17,7 +17,7 @@ LOOK = 1.6
 WINDOW = 2.0
 """The place on the way is looked for so far ahead of the last one, metres."""
 
-OVERVIEW = 4.0
+OVERVIEW = 8.0
 """Where somebody is bound for is told by the place of their way so far ahead, metres."""
 
 BRAKING = 0.7
