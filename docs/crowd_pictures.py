@@ -19,7 +19,8 @@ from matplotlib.figure import Figure
 
 import stridecast as sc
 from stridecast.body import kinematics
-from stridecast.crowd.crowd import Crowd, CrowdFrame
+from stridecast.crowd.crowd import Crowd
+from stridecast.crowd.frame import CrowdFrame
 from stridecast.formats.picture import Camera, draw_body
 from stridecast.formats.scenes import load_scene
 from stridecast.model.scene import Circle, Scene

@@ -8,7 +8,8 @@ import pytest
 from stridecast.body import kinematics
 from stridecast.crowd.baking import LONGEST, Baking, overlap_depths
 from stridecast.crowd.bodies import stature
-from stridecast.crowd.crowd import Crowd, CrowdFrame
+from stridecast.crowd.crowd import Crowd
+from stridecast.crowd.frame import CrowdFrame
 from stridecast.errors import InputError
 from stridecast.model.people import Person
 from stridecast.model.scene import Scene

@@ -10,7 +10,8 @@ import pytest
 import stridecast as sc
 from crowds import Walked, beyond, overlap
 from stridecast.crowd.bounds import HumanBounds
-from stridecast.crowd.crowd import Crowd, CrowdFrame
+from stridecast.crowd.crowd import Crowd
+from stridecast.crowd.frame import CrowdFrame
 from stridecast.crowd.rules import RULES
 from stridecast.errors import InputError, PathError, SceneError
 from stridecast.model.database import MotionDatabase
@@ -343,15 +344,20 @@ class TestRefusals:
             np.testing.assert_array_equal(a.positions, b.positions)
             np.testing.assert_array_equal(a.rules, b.rules)
 
+    def test_a_source_without_a_way_out_is_told_at_once(self, database):
+        room = Wall(name="room", points=np.array([(-2, -2), (2, -2), (2, 2), (-2, 2), (-2, -2)], float))
+        free = person("free", (12.0, 0.0), (12.0, 30.0))
+        with pytest.raises(PathError, match=r"'cell 1'.*'room' is in the way"):
+            crowd_of(database, free, sources=(point_source("cell", flow=0.05, most=4),), walls=(room,))
+
     def test_who_has_no_way_stays_out_and_everybody_else_goes_on(self, database, caplog):
         room = Wall(name="room", points=np.array([(-2, -2), (2, -2), (2, 2), (-2, 2), (-2, -2)], float))
-        late = person("late", (9.0, 0.0), (9.0, 5.0), begins=2.0)
+        late = person("late", (0.0, 0.0), (9.0, 5.0), begins=2.0)
         free = person("free", (12.0, 0.0), (12.0, 30.0))
-        crowd = crowd_of(database, late, free, sources=(point_source("cell", flow=3.0, most=4),), walls=(room,))
-        alone = crowd_of(database, late, free, walls=(room,))
+        crowd, alone = (crowd_of(database, *who, walls=(room,)) for who in ((late, free), (free,)))
         for _ in range(150):
             a, b = crowd.step(), alone.step()
             np.testing.assert_array_equal(a.positions, b.positions)
-        assert [p.name for p in crowd.came] == ["free", "late"]
-        assert [p.name for p in crowd.turned_away] == [f"cell {k + 1}" for k in range(4)]
-        assert "person 'cell 1'" in caplog.text
+        assert [p.name for p in crowd.came] == ["free"]
+        assert [p.name for p in crowd.turned_away] == ["late"]
+        assert "person 'late'" in caplog.text

@@ -11,7 +11,7 @@ from stridecast.cli.databases import DatabaseOption, open_database
 
 if TYPE_CHECKING:
     from stridecast.crowd.baking import Baking
-    from stridecast.crowd.crowd import CrowdFrame
+    from stridecast.crowd.frame import CrowdFrame
     from stridecast.formats.crowd_files import CrowdFiles
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from stridecast.crowd.crowd import Crowd, CrowdFrame
+from stridecast.crowd.crowd import Crowd
+from stridecast.crowd.frame import CrowdFrame
 from stridecast.errors import InputError
 from stridecast.geometry import quaternions as quat
 from stridecast.model.motion import Motion

@@ -56,6 +56,9 @@ HEADWAY = 0.4
 JAM = 0.08
 """Nearer than this nobody follows, metres."""
 
+JAM_LEFT_ALONE = 0.35
+"""The same of people who block each other: they need the room, metres."""
+
 FREE = 6.0
 """Who is further ahead does not matter, metres."""
 
@@ -77,17 +80,14 @@ KEEP = 0.3
 MANY = 6
 """So many are many."""
 
-JAM_LEFT_ALONE = 0.35
-"""The same of people who block each other: they need the room, metres."""
-
 TURN = 0.15
 """Price of going to the other side than one has turned to, for those who hardly move."""
 
 SIDE = 0.35
 """Price of the wrong side."""
 
-TURNING, TURNING_AMONG_OTHERS = 0.02, 0.1
-"""Price of another direction, a radian of it: alone, and where others are in the way, lest people waver."""
+TURNING = 0.1
+"""Price of another direction where others are in the way, a radian of it, lest people waver."""
 
 CHANGE = 0.2
 """Price of changing one's mind."""
@@ -126,13 +126,14 @@ def weigh(
     x, z = moving.position[c, 0], moving.position[c, 1]
     fastest = wish * (HURRY if rule == GO_FIRST else 1.0)
     firm = 2.0 if rule == GO_ON else 1.0
-    drift = lane(seen, count, dx, dz) * (people.side[c] if people.side[c] != 0.0 else -1.0)
+    many = 0.0 if rule == GO_ON else lane(seen, count, dx, dz)
+    drift = many * (people.side[c] if people.side[c] != 0.0 else -1.0)
     yields = other if rule == GO_ON else -1
     scale = 1.0 / max(wish, 0.1)
     out = moving.opposed[c]
     aim = math.hypot(moving.target[c, 0], moving.target[c, 1])
     still = aim > 0.0 and math.hypot(moving.velocity[c, 0], moving.velocity[c, 1]) < 0.3
-    firmly = TURNING if rule in (ON_THE_WAY, RETURN) else TURNING_AMONG_OTHERS
+    firmly = 0.0 if rule in (ON_THE_WAY, RETURN) else TURNING
     radius, keep = people.radius[c], min(people.keep[c], 0.5)
     n = 0
     for a in range(len(ANGLES) + 1):
@@ -199,7 +200,7 @@ def lane(seen: np.ndarray, count: int, dx: float, dz: float) -> float:
         along = o[PX] * dx + o[PZ] * dz
         if along > 0.0 and o[HX] * dx + o[HZ] * dz < -0.5 and abs(o[PX] * dz - o[PZ] * dx) < ABREAST:
             total += 1.0 / MANY
-    return min(total, 1.0)
+    return min(max(total - 1.0 / MANY, 0.0), 1.0)  # one is not many
 
 
 @kernel

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import hashlib
 import logging
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import islice
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from stridecast.crowd.bodies import LEVELS, Bodies, motions_of, scaled_to, stature
 from stridecast.crowd.bounds import HumanBounds
 from stridecast.crowd.explanation import Explanation, explanation_of
+from stridecast.crowd.frame import CrowdFrame
 from stridecast.crowd.ground import ground_of
+from stridecast.crowd.newcomers import chance_of, newcomer_of, obstacle_of, slots_of, walker_of
 from stridecast.crowd.population import Due, Population
 from stridecast.crowd.routes import Routes
 from stridecast.crowd.state import make_limits
@@ -23,63 +24,17 @@ from stridecast.crowd.traffic import ARRIVED, Newcomer, Traffic
 from stridecast.errors import InputError, PathError, SceneError
 from stridecast.geometry.kernels import is_compiled
 from stridecast.model.database import MotionDatabase
-from stridecast.model.people import Mover, Person
+from stridecast.model.people import Person
 from stridecast.model.pose import VehicleState
 from stridecast.model.scene import Circle, Scene
-from stridecast.model.segment import RUN
 from stridecast.model.skeleton import Skeleton
+from stridecast.paths.solids import Solids
 
 Array = np.ndarray
 log = logging.getLogger("stridecast")
 
-KEEPS = {"near": 0.1, "far": 0.35}
-"""What is kept from others beyond the bodies where there is room, by preference, metres."""
-
-BESIDE = 0.15
-"""What people who walk together leave between them, metres."""
-
-SIDES = {"none": 0.0, "left": 1.0, "right": -1.0}
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CrowdFrame:
-    """Everybody who is there in one frame; arrays have a leading ``people`` axis.
-
-    Parameters
-    ----------
-    time
-        Seconds since the beginning.
-    ids
-        Numbers of the people, in the order in which they came, from 1.
-    positions, velocities, accelerations
-        Of the vehicles, ground points: m, m/s, m/s2.
-    headings
-        Radians.
-    radii
-        Of the bodies, metres.
-    rules
-        What each is up to (see ``crowd.rules.RULES``).
-    heights
-        Of the bodies, as a part of the database's.
-    roots, rotations, planted
-        Their poses, as of ``Pose``; nothing where the crowd has no bodies.
-    movers
-        Places of the moving obstacles.
-    """
-
-    time: float
-    ids: Int[Array, "people"]
-    positions: Float[Array, "people 2"]
-    velocities: Float[Array, "people 2"]
-    accelerations: Float[Array, "people 2"]
-    headings: Float[Array, "people"]
-    radii: Float[Array, "people"]
-    rules: Int[Array, "people"]
-    heights: Float[Array, "people"]
-    roots: Float[Array, "people 3"] | None
-    rotations: Float[Array, "people joints 4"] | None
-    planted: Bool[Array, "people 2"] | None
-    movers: Float[Array, "movers 2"]
+FIRST_COMERS = 5000
+"""Among so many of those to come somebody of each source is looked for, to see whether there is a way."""
 
 
 class Crowd:
@@ -139,7 +94,7 @@ class Crowd:
         if agents:
             scene = replace(scene, people=(*scene.people, *agents))
         if scene.has_walker:
-            scene = replace(scene, people=(*scene.people, _walker_of(scene)))
+            scene = replace(scene, people=(*scene.people, walker_of(scene)))
         if not (scene.people or scene.sources):
             raise SceneError("the scene has nobody in it: a crowd needs people or sources of people")
         self.database, self.scene, self.frame_rate, self.lod = database, scene, rate, lod
@@ -162,7 +117,8 @@ class Crowd:
         self._next: Due | None = next(self._coming, None)
         if not propose.signatures and not is_compiled(propose):
             log.warning("compiling the crowd, once for this machine and version: this takes a minute")
-        self._movers = [self._add_mover(mover) for mover in scene.movers]
+        self._check_sources()
+        self._movers = self._traffic.add([obstacle_of(mover) for mover in scene.movers]).tolist()
         self._let_in(progress)
 
     def _standing(self) -> list[Circle]:
@@ -232,6 +188,59 @@ class Crowd:
         rows = self._rows
         stay = rows[self._settled(rows)]
         return frozenset(self._ids[np.concatenate((stay, self._traffic.arrived()))].tolist())
+
+    def change(self, scene: Scene) -> None:
+        """Take over the roads, obstacles and walls of another scene while people walk; they find new ways at once.
+
+        Parameters
+        ----------
+        scene
+            The new place. Its people, sources, movers and task do not matter: who is there, and comes, stays the same.
+
+        Raises
+        ------
+        SceneError
+            Something new stands where somebody is, or in the room that they need to stop; they are named. Polygons that
+            are none.
+        PathError
+            Somebody would have no way on; they are named. After any of these nothing has changed.
+        """
+        place = replace(self.scene, roads=scene.roads, obstacles=scene.obstacles, walls=scene.walls)
+        solids = Solids(place)
+        rows, m = self._rows, self._traffic.moving
+        for row in rows.tolist():
+            path = np.concatenate((m.position[row : row + 1], m.path[row, : m.stops[row]]))
+            if not solids.are_clear(path, np.full(len(path), self._traffic.people.radius[row])).all():
+                raise SceneError(
+                    f"something new would stand in the way of {self._people[row].name!r}, who is at "
+                    f"({m.position[row, 0]:.2f}, {m.position[row, 1]:.2f}) and cannot stop before it"
+                )
+        routes = Routes(place, self._standing())
+        ways = {row: self._way_on(routes, row) for row in rows.tolist() if self._traffic.people.points[row] >= 2}
+        self.scene, self._routes, self._population.solids = place, routes, solids
+        self._traffic.ground = ground_of(place, solids)
+        for row, way in ways.items():
+            self._traffic.send(row, way)
+
+    def _way_on(self, routes: Routes, row: int) -> Array:
+        """The way from where somebody is through the stops that are left."""
+        person, here = self._people[row], self._traffic.moving.position[row]
+        stops = np.concatenate(person.stops)
+        left = self._traffic.passed(row, stops)
+        try:
+            return routes.again(person, here, stops[min(left, len(stops) - 1) :])
+        except (SceneError, PathError) as error:
+            raise type(error)(f"person {person.name!r} has no way on: {error}") from None
+
+    def _check_sources(self) -> None:
+        """Find a way for the first who comes from each source, lest it turns out in mid-shot that there is none."""
+        missing = {source.name for source in self.scene.sources if source.routes}
+        for due in islice(self._population, FIRST_COMERS):
+            if not missing:
+                return
+            if due.source in missing:
+                self._ways(due.people)
+                missing.discard(due.source)
 
     def explain(self, who: int | str) -> Explanation:
         """What somebody is up to, and why.
@@ -333,8 +342,8 @@ class Crowd:
         group = self._population.place(due, discs, attempt=attempt)
         if group is None:
             return False
-        slots = _slots(group)
-        news = [self._newcomer(*each) for each in zip(group, self._ways(group), slots, strict=True)]
+        each = zip(group, self._ways(group), slots_of(group), strict=True)
+        news = [newcomer_of(person, way, slot, self.bounds, self.seed) for person, way, slot in each]
         at = self._add_together(news)
         if at is None:
             at = self._add_together([replace(new, speed=0.0) for new in news])
@@ -354,7 +363,7 @@ class Crowd:
                 at,
                 np.array([person.start for person in group]),
                 self._traffic.moving.heading[at],
-                phases=np.array([_chance(person.name, self.seed, "phase") for person in group]),
+                phases=np.array([chance_of(person.name, self.seed, "phase") for person in group]),
                 heights=np.array([person.height or self._bodies.height for person in group]),
                 sizes=[person.behavior.size for person in group],
                 styles=np.array([person.behavior.style for person in group]),
@@ -382,44 +391,6 @@ class Crowd:
             ways.append(way)
         return ways
 
-    def _newcomer(self, person: Person, way: Array, slot: float) -> Newcomer:
-        b = person.behavior
-        heading = person.heading
-        if heading is None:
-            ahead = way[min(4, len(way) - 1)] - way[0]  # people who walk together all look the same way
-            heading = math.atan2(*ahead) if len(way) > 1 and np.hypot(*ahead) > 1e-6 else 0.0
-        fastest = self.bounds.fastest[-1 if b.status == RUN else 0]
-        return Newcomer(
-            number=_number(person.name),
-            position=(float(person.start[0]), float(person.start[1])),
-            heading=heading,
-            way=way,
-            speed=min(person.speed, 0.95 * fastest, b.velocity),
-            wish=min(b.velocity, 0.95 * fastest),
-            radius=b.body_radius,
-            runs=b.status == RUN,
-            side=SIDES[b.preference.side],
-            keep=KEEPS[b.preference.distance],
-            waits=b.preference.patience == "wait",
-            rank=_chance(person.name, self.seed, "rank"),
-            company=-1 if person.together is None else _number(person.together),
-            slot=slot,
-            stays=person.stays,
-        )
-
-    def _add_mover(self, mover: Mover) -> int:
-        place = mover.at(np.zeros(()))
-        new = Newcomer(
-            number=_number(mover.name),
-            position=(float(place[0]), float(place[1])),
-            heading=0.0,
-            way=place[None],
-            radius=mover.radius,
-            rank=2.0,
-            mover=mover,
-        )
-        return int(self._traffic.add([new])[0])
-
     def _step_bodies(self, bodies: Bodies, focus: Sequence[float] | None) -> None:
         rows, m = self._rows, self._traffic.moving
         if not len(rows):
@@ -443,30 +414,3 @@ class Crowd:
             np.where(aims, np.inf, (m.stops[rows] - 1) / self.frame_rate),
             levels,
         )
-
-
-def _walker_of(scene: Scene) -> Person:
-    """The one walker of a scene is one of its people."""
-    start, goals = scene.task()
-    names = {person.name for person in scene.people}
-    name = next(n for n in ("walker", *(f"walker {k}" for k in range(2, len(names) + 3))) if n not in names)
-    return Person(
-        name=name, start=start, stops=tuple(goal[None] for goal in goals), behavior=scene.behavior, stays=True
-    )
-
-
-def _slots(group: tuple[Person, ...]) -> list[float]:
-    """Places of a group beside each other, to the left of its way, metres."""
-    widths = [2 * person.behavior.body_radius + BESIDE for person in group]
-    edges = np.concatenate(([0.0], np.cumsum(widths)))
-    return (0.5 * (edges[1:] + edges[:-1]) - 0.5 * edges[-1]).tolist() if len(group) > 1 else [0.0]
-
-
-def _number(name: str) -> int:
-    """A number that only depends on a name."""
-    return int.from_bytes(hashlib.blake2b(name.encode(), digest_size=7).digest(), "big")
-
-
-def _chance(name: str, seed: int, what: str) -> float:
-    """A number from 0 to below 1 that only depends on a name, the seed, and what it is for."""
-    return _number(f"{what} {seed} {name}") / 2.0**56

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from stridecast.crowd.ground_kernels import free_way
-from stridecast.crowd.neighbour_kernels import BX, BZ, EX, EZ, FELLOW, PX, PZ, RADIUS, RANK, ROW
+from stridecast.crowd.neighbour_kernels import BX, BZ, EX, EZ, FELLOW, PX, PZ, RADIUS, RANK, ROW, SETTLING, VX, VZ
 from stridecast.crowd.rules import (
     BEHIND,
     FOLLOW,
@@ -24,10 +24,10 @@ from stridecast.crowd.rules import (
 from stridecast.crowd.state import Ground, Moving, People
 from stridecast.geometry.kernels import kernel
 
-WINDOW = 4.0
+WINDOW = 8.0
 """So far people look ahead, seconds."""
 
-MARGIN = 0.08
+MARGIN = 0.04
 """Who comes nearer than this counts as a collision, metres."""
 
 STANDS = 0.15
@@ -37,7 +37,7 @@ OPPOSITE, SAME = math.radians(135.0), math.radians(45.0)
 """Directions that differ by more than the first meet head-on, by less than the second one overtakes the other."""
 
 PERSISTS, PERSISTS_LONGER = 2.0, 4.0
-"""An encounter that lasts so long is tried on the other side, then waited out, seconds."""
+"""A close encounter that lasts so long is tried on the other side, then waited out, seconds."""
 
 OFFSET = 0.7
 """Who has no preference passes on the right, unless the other is so far to the right, in parts of both radii."""
@@ -50,6 +50,12 @@ CLOSING_UP = 0.15
 
 QUEUES = 0.3
 """Somebody who stands and is bound the way one goes (cosine) waits in a queue."""
+
+LATE = 0.6
+"""Who need not give way goes on until they would meet within this, seconds."""
+
+USUAL = 1.0
+"""Somebody who is just setting off is expected to go so fast at least, m/s."""
 
 CLOSE = 1.2
 """... if they would meet within this, seconds."""
@@ -95,7 +101,9 @@ def answer(
         left, -1 right, 0 either), greatest speed.
     """
     # What would happen on the way as meant, at the speed at which one is.
-    pace = max(math.hypot(moving.velocity[c, 0], moving.velocity[c, 1]), min(wish, 0.6))
+    ahead_x = moving.velocity[c, 0] + SETTLING * moving.acceleration[c, 0]
+    ahead_z = moving.velocity[c, 1] + SETTLING * moving.acceleration[c, 1]
+    pace = max(math.hypot(ahead_x, ahead_z), min(wish, 0.6))
     ux, uz = pace * dx, pace * dz
     radius, waits = people.radius[c], people.waits[c]
     threat, soonest = -1, WINDOW
@@ -111,7 +119,7 @@ def answer(
         return ON_THE_WAY, -1, math.inf, 0.0, math.inf
     o = seen[threat]
     j = int(o[ROW])
-    moving.since[c] = moving.since[c] + elapsed if moving.other[c] == j else 0.0
+    moving.since[c] = moving.since[c] + elapsed if moving.other[c] == j and soonest < 1.5 * CLOSE else 0.0
     px, pz, ex, ez = o[PX], o[PZ], o[EX], o[EZ]
     off = px * dz - pz * dx  # how far to the left the other is
     moves = math.hypot(ex, ez) > STANDS
@@ -127,7 +135,7 @@ def answer(
     if not moves:
         rule = PASS_ROUND
     elif between > OPPOSITE:
-        if not junior and soonest > CLOSE:
+        if not junior and soonest > LATE:
             return GO_ON, j, soonest, 0.0, math.inf
         rule = HEAD_ON
     elif between < SAME:
@@ -144,8 +152,13 @@ def answer(
     else:
         # Who is first where the ways cross; the other's tail is on the side from which it comes.
         tail = 1.0 if ex * dz - ez * dx < 0.0 else -1.0
-        arrives, comes = crossing_times(px, pz, ux, uz, ex, ez)
-        if arrives < comes + (-0.2 if waits else 0.0 if junior else 0.2):
+        # Both are taken to go at a usual pace by then, lest half a step at the beginning decides.
+        up = max(pace, min(wish, USUAL)) / pace
+        comes_up, gets = 1.0, math.hypot(ex, ez)
+        if gets > math.hypot(o[VX], o[VZ]) + 0.02 and gets < USUAL:
+            comes_up = USUAL / gets
+        arrives, comes = crossing_times(px, pz, up * ux, up * uz, comes_up * ex, comes_up * ez)
+        if arrives < comes + (-0.2 if waits else 0.1 if junior else 0.2):
             return GO_FIRST, j, soonest, -tail, math.inf
         if soonest < 0.7 * CLOSE:
             return SLOW_DOWN, j, soonest, tail, 0.5 * wish

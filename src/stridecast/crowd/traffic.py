@@ -135,6 +135,23 @@ class Traffic:
         about = np.isin(m.other, rows)
         m.other[about], m.contact[about], m.since[about] = -1, np.inf, 0.0
 
+    def send(self, row: int, way: Float[Array, "points 2"]) -> None:
+        """Send somebody another way from where they are."""
+        along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=-1))))
+        self.people.first[row], self.people.points[row] = len(self.ways.points), len(way)
+        self.moving.place[row] = 0.0
+        self.ways = Ways(points=np.concatenate((self.ways.points, way)), along=np.concatenate((self.ways.along, along)))
+
+    def passed(self, row: int, stops: Float[Array, "stops 2"]) -> int:
+        """How many of the stops on somebody's way lie behind them."""
+        first, count = int(self.people.first[row]), int(self.people.points[row])
+        points, along = self.ways.points[first : first + count], self.ways.along[first : first + count]
+        done, k = 0, 0
+        for point in stops:  # one after the other, as a way may cross itself
+            k += int(np.argmin(np.linalg.norm(points[k:] - point, axis=-1)))
+            done += int(along[k] < self.moving.place[row])
+        return done
+
     def _forget_ways(self) -> None:
         """Drop the ways of those who have left, once they are more than the others'."""
         rows = self.present

@@ -46,7 +46,7 @@ def find_place(people: People, moving: Moving, ways: Ways, c: int) -> None:
         dx, dz = ways.points[k + 1, 0] - ways.points[k, 0], ways.points[k + 1, 1] - ways.points[k, 1]
         length = ways.along[k + 1] - ways.along[k]
         u = ((x - ways.points[k, 0]) * dx + (z - ways.points[k, 1]) * dz) / (length * length)
-        u = min(max(u, 0.0), 1.0)
+        u = max(u, 0.0) if k == first + count - 2 else min(max(u, 0.0), 1.0)  # beyond the end it goes straight on
         ex, ez = x - ways.points[k, 0] - u * dx, z - ways.points[k, 1] - u * dz
         gap = ex * ex + ez * ez
         if gap < best - 1e-9:
