@@ -151,15 +151,16 @@ def avenue(folder: Path, seed: int) -> None:
     scene = load_scene(SCENES / "avenue.yaml")
     crowd = Crowd(sc.sample_database(), scene, seed=seed, bodies=False)
     shown = walk(crowd, scene.seconds or 60.0)
-    figure = Figure(figsize=(15, 4.6), dpi=80, layout="constrained")
+    figure = Figure(figsize=(15, 3.9), dpi=80, layout="constrained")
     axes = figure.subplots()
     draw_place(axes, scene, lying=True)
+    every = round(5 * crowd.frame_rate)
     for number, person in enumerate(crowd.came, 1):
         seen = [(frame.time, frame.positions[frame.ids == number][0]) for frame in shown if number in frame.ids]
         trail = seen_from_above(np.array([place for _, place in seen]), True)
         colour = f"C{number - 1}"
         axes.plot(*trail.T, color=colour, lw=1.5)
-        moments = [k for k, (time, _) in enumerate(seen) if round(time * crowd.frame_rate) % round(5 * crowd.frame_rate) == 0]
+        moments = [k for k, (time, _) in enumerate(seen) if round(time * crowd.frame_rate) % every == 0]
         axes.plot(*trail[moments].T, "o", color=colour, ms=4)
         for k in moments[1:]:
             axes.annotate(f"{seen[k][0]:.0f}", trail[k], (0, 4), textcoords="offset points", color=colour, fontsize=7)
