@@ -60,6 +60,7 @@ def main() -> None:
     contacts([analyse(sc.load_motion(path)) for path in take_files(folder, "16_31", "16_33", "16_55", "127_04")])
     gait(folder)
     sample(folder)
+    styles()
     scene()
 
 
@@ -385,6 +386,25 @@ def sample_strips() -> Sequence[tuple[str, SampleTake, tuple[float, float, float
         ("stop", stop, (1.9, 4.0, 0.15), FROM_RIGHT, 0.04),
         ("walk to run\n1.4 to 3.5 m/s", run, (0.9, 2.6, 0.1), FROM_RIGHT, 0.04),
     )
+
+
+def styles() -> None:
+    """A gloomy, a neutral and a brisk stride of a walker, from the side and from the front, at the same speed."""
+    speed, row, width, label, sides, fronts = 1.3, 2.0, 18.4, 1.7, 9, 6
+    paper = Paper(width, 3 * row + 0.3)
+    database = sc.sample_database()
+    for level, style in zip((2 * row, row, 0.0), ("gloomy", "neutral", "brisk"), strict=True):
+        level += 0.1
+        journey = follow(database, stream_along(np.array([[0.0, 0.0], [0.0, 14.0]]), speed), style=style)
+        take = analyse(journey.motion)
+        stride = stride_near(take, speed, 0)[1]
+        steps = 2 * journey.motion.frame_rate / len(stride)
+        paper.floor(label, width - 0.2, level)
+        paper.write((0.15, level + 1.15), f"{style}\n{steps:.2f} steps/s")
+        for count, x0, step, azimuth in ((sides, label + 0.6, 1.2, FROM_RIGHT), (fronts, label + 11.6, 0.9, 0.0)):
+            for k, frame in enumerate(stride[np.arange(count) * len(stride) // count]):
+                paper.body(journey.motion, frame, (x0 + k * step, level), float(take.vehicle.headings[frame]) + azimuth)
+    save(paper.figure, "styles.png", colours=32)
 
 
 def scene() -> None:
