@@ -72,6 +72,9 @@ CONTRARY = 0.1
 GOING_ROUND = 3.0
 """... and the others go round the jam, for about so long, seconds."""
 
+TIGHT, WEDGED = 0.15, 4.0
+"""Who stands so close (metres) to whom they follow, for so long (seconds), is wedged, as at a door."""
+
 CONE = 0.6
 """Who is within this cosine of the direction wished for is in front."""
 
@@ -273,7 +276,8 @@ def decide(
         patience = (0.6 if people.waits[c] else 1.0) * PATIENCE * (1.0 + 2.0 * people.rank[c])
         if moving.stuck[c] > STUCK:
             gap, moving.opposed[c], jammed = in_front(moving, seen, count, c, people.radius[c], dx, dz)
-            moving.jammed_next[c] = jammed or moving.opposed[c]
+            wedged = gap < TIGHT and moving.stuck[c] > WEDGED * (1.0 + people.rank[c])
+            moving.jammed_next[c] = jammed or moving.opposed[c] or wedged
             if not moving.jammed_next[c]:
                 patience *= QUEUING
             else:
