@@ -72,7 +72,7 @@ CONTRARY = 0.1
 GOING_ROUND = 3.0
 """... and the others go round the jam, for about so long, seconds."""
 
-TIGHT, WEDGED = 0.15, 4.0
+TIGHT, WEDGED = 0.15, 2.5
 """Who stands so close (metres) to whom they follow, for so long (seconds), is wedged, as at a door."""
 
 CONE = 0.6
