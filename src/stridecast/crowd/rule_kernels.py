@@ -54,8 +54,11 @@ QUEUES = 0.3
 LATE = 0.6
 """Who need not give way goes on until they would meet within this, seconds."""
 
-USUAL = 1.0
+USUAL = 1.3
 """Somebody who is just setting off is expected to go so fast at least, m/s."""
+
+WAITS, GOES = 0.6, 0.2
+"""Who rather waits goes first only with so much time to spare; who rather goes, also if so late, seconds."""
 
 CLOSE = 1.2
 """... if they would meet within this, seconds."""
@@ -158,7 +161,8 @@ def answer(
         if gets > math.hypot(o[VX], o[VZ]) + 0.02 and gets < USUAL:
             comes_up = USUAL / gets
         arrives, comes = crossing_times(px, pz, up * ux, up * uz, comes_up * ex, comes_up * ez)
-        if arrives < comes + (-0.2 if waits else 0.1 if junior else 0.2):
+        lead = -WAITS if waits else GOES if junior else 2.0 * GOES
+        if arrives < comes + lead:
             return GO_FIRST, j, soonest, -tail, math.inf
         if soonest < 0.7 * CLOSE:
             return SLOW_DOWN, j, soonest, tail, 0.5 * wish
