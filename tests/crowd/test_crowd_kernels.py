@@ -91,9 +91,9 @@ class TestSafety:
         paths = []
         dt = 1.0 / 30
         for _ in range(2):
-            runs, _, state = random_state(rng)
+            _, _, state = random_state(rng)
             out = np.full((121, 2), np.nan)
-            n = stop(LIMITS, runs, *state[:7], dt, out)
+            n = stop(LIMITS, *state[:6], dt, out)
             shift = rng.uniform(-1.5, 1.5, 2)
             paths.append((out + shift, n))
         (one, n), (other, m) = paths
@@ -108,7 +108,7 @@ class TestSafety:
     def test_a_stop_is_what_braking_does_and_never_turns_back(self, seed):
         runs, dt, state = random_state(np.random.default_rng(seed))
         out = np.full((round(4.0 / dt) + 1, 2), np.nan)
-        n = stop(LIMITS, runs, *state[:7], dt, out)
+        n = stop(LIMITS, *state[:6], dt, out)
         assert n < len(out)  # nobody needs longer than that
         assert np.isfinite(out[:n]).all()
         assert np.isnan(out[n:]).all()

@@ -375,7 +375,7 @@ def try_target(
         uz,
         dt,
     )
-    n = stop(limits, runs, x, z, vx, vz, ax, az, heading, dt, moving.meant[c])
+    n = stop(limits, x, z, vx, vz, ax, az, dt, moving.meant[c])
     moving.meant_stops[c] = n
     out = moving.next[c]
     out[0], out[1], out[2], out[3], out[4], out[5], out[6] = x, z, vx, vz, ax, az, heading
@@ -436,13 +436,12 @@ def fits(
     limits: Limits,
     state: np.ndarray,
     radius: float,
-    runs: bool,
     things: np.ndarray,
     path: np.ndarray,
     dt: float,
 ) -> bool:
     """Whether somebody who appears in a state has room to stop, and leaves it to everybody else."""
-    n = stop(limits, runs, state[0], state[1], state[2], state[3], state[4], state[5], state[6], dt, path)
+    n = stop(limits, state[0], state[1], state[2], state[3], state[4], state[5], dt, path)
     standing = standing_near(ground, state[0], state[1], REACH, things)
     for m in range(standing):
         if room(ground, things[m], state[0], state[1]) < radius:

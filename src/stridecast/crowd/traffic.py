@@ -123,8 +123,8 @@ class Traffic:
         m.target[row] = m.velocity[row]
         if len(new.way) > 1:
             m.bound[row] = ahead
-        state = (*m.position[row], *m.velocity[row], 0.0, 0.0, new.heading)
-        m.stops[row] = stop(self.limits, bool(new.runs), *map(float, state), 1.0 / self.frame_rate, m.path[row])
+        state = (*m.position[row], *m.velocity[row], 0.0, 0.0)
+        m.stops[row] = stop(self.limits, *map(float, state), 1.0 / self.frame_rate, m.path[row])
         if new.mover is not None:
             self._scripts[row] = (new.mover, float(new.mover.times[0]) if self.frame else 0.0)
 
@@ -222,7 +222,7 @@ class Traffic:
     def has_room(self, new: Newcomer) -> bool:
         """Whether somebody can appear so that everybody keeps the room to stop."""
         ahead = (float(np.sin(new.heading)), float(np.cos(new.heading)))
-        state = (*new.position, new.speed * ahead[0], new.speed * ahead[1], 0.0, 0.0, new.heading)
+        state = (*new.position, new.speed * ahead[0], new.speed * ahead[1], 0.0, 0.0)
         return bool(
             fits(
                 self.people,
@@ -231,7 +231,6 @@ class Traffic:
                 self.limits,
                 np.array(state, np.float64),
                 new.radius,
-                new.runs,
                 np.zeros(STANDING, np.int64),
                 np.zeros((self._frames, 2)),
                 1.0 / self.frame_rate,

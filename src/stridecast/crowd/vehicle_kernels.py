@@ -43,6 +43,45 @@ def at_speed(limits: Limits, speed: float) -> tuple[float, float, float, float]:
 
 
 @kernel
+def brake(
+    limits: Limits, x: float, z: float, vx: float, vz: float, ax: float, az: float, dt: float
+) -> tuple[float, float, float, float, float, float]:
+    """Position, velocity and acceleration of a vehicle after a frame of braking as hard as the bounds allow."""
+    speed = math.hypot(vx, vz)
+    if speed == 0.0:
+        return x, z, 0.0, 0.0, 0.0, 0.0
+    sine, cosine = vx / speed, vz / speed
+    jerk, low, high, wide = at_speed(limits, speed)
+    if rests(speed, vx, vz, ax, az, jerk * dt, dt):
+        return x, z, 0.0, 0.0, -vx / dt, -vz / dt
+    had_t, had_l = ax * sine + az * cosine, ax * cosine - az * sine
+    t, lateral, _, _, _, _ = limit(
+        -1e9, 0.0, had_t, had_l, speed, jerk, jerk, low, high, wide, 0.0, speed + 1.0, dt, 0.0
+    )
+    ax, az = t * sine + lateral * cosine, t * cosine - lateral * sine
+    vx, vz = vx + ax * dt, vz + az * dt
+    return x + vx * dt, z + vz * dt, vx, vz, ax, az
+
+
+@kernel
+def rests(speed: float, vx: float, vz: float, ax: float, az: float, reach: float, dt: float) -> bool:
+    """Whether this is the last frame: nothing is left of the speed then, and of the acceleration what goes in the next.
+
+    ``reach`` is the greatest change of acceleration in a frame.
+    """
+    return speed <= reach * dt and math.hypot(ax + vx / dt, az + vz / dt) <= reach
+
+
+@kernel
+def turned(heading: float, vx: float, vz: float, most: float) -> float:
+    """Heading of a body that turns into the direction of motion, by no more than ``most``."""
+    if math.hypot(vx, vz) <= 1e-3:
+        return heading
+    off = wrap(math.atan2(vx, vz) - heading)
+    return wrap(heading + min(max(off, -most), most))
+
+
+@kernel
 def advance(
     limits: Limits,
     runs: bool,
@@ -66,34 +105,30 @@ def advance(
         Position, velocity, acceleration, heading, side of a reversal under way.
     """
     speed, wish = math.hypot(vx, vz), math.hypot(ux, uz)
-    if speed == 0.0 and wish < REST:
-        return x, z, 0.0, 0.0, 0.0, 0.0, heading, 0.0
+    jerk, low, high, wide = at_speed(limits, speed)
+    most = max(SPIN, wide) * dt
+    if wish < REST:
+        x, z, vx, vz, ax, az = brake(limits, x, z, vx, vz, ax, az, dt)
+        return x, z, vx, vz, ax, az, turned(heading, vx, vz, most), 0.0
     # The direction of motion; from rest one can go off in any.
     if speed > 0.0:
         sine, cosine = vx / speed, vz / speed
     else:
         sine, cosine = ux / wish, uz / wish
-    jerk, low, high, wide = at_speed(limits, speed)
     fastest = KEPT * limits.fastest[1 if runs else 0]
     askew = abs(wrap(math.atan2(sine, cosine) - heading))
     if askew > ASKEW:
         fastest = max(ASIDE if askew < ABOUT else BACK, speed)
     along, across = ux * sine + uz * cosine, ux * cosine - uz * sine
-    if wish < REST:
-        wish_t, wish_l = -1e9, 0.0
-        turning = 0.0
-    else:
-        angle = math.atan2(across, along)
-        if abs(angle) > SHARP:
-            slower = max(math.cos(angle), 0.0) * wish
-            along, across = slower * along / wish, slower * across / wish
-            wish_t, wish_l, turning = pull(along, across, speed, 0.0, fastest, RESPONSE, jerk, turning, dt)
-            wish_l = math.copysign(wide * speed, angle if turning == 0.0 else turning)
-        else:
-            wish_t, wish_l, turning = pull(along, across, speed, 0.0, fastest, RESPONSE, jerk, turning, dt)
-    reach = jerk * dt
-    if wish_t <= 0.0 and speed <= reach * dt and math.hypot(ax + vx / dt, az + vz / dt) <= reach:
-        # The last frame: nothing is left of the speed, and of the acceleration no more than can go in the next.
+    angle = math.atan2(across, along)
+    sharp = abs(angle) > SHARP
+    if sharp:
+        slower = max(math.cos(angle), 0.0)
+        along, across = slower * along, slower * across
+    wish_t, wish_l, turning = pull(along, across, speed, 0.0, fastest, RESPONSE, jerk, turning, dt)
+    if sharp:
+        wish_l = math.copysign(wide * speed, angle if turning == 0.0 else turning)
+    if wish_t <= 0.0 and rests(speed, vx, vz, ax, az, jerk * dt, dt):
         return x, z, 0.0, 0.0, -vx / dt, -vz / dt, heading, turning
     had_t, had_l = ax * sine + az * cosine, ax * cosine - az * sine
     t, lateral, _, _, _, _ = limit(
@@ -101,26 +136,18 @@ def advance(
     )
     ax, az = t * sine + lateral * cosine, t * cosine - lateral * sine
     vx, vz = vx + ax * dt, vz + az * dt
-    now = math.hypot(vx, vz)
-    x, z = x + vx * dt, z + vz * dt
-    if now > 1e-3:
-        off = wrap(math.atan2(vx, vz) - heading)
-        most = max(SPIN, wide) * dt
-        heading = wrap(heading + min(max(off, -most), most))
-    return x, z, vx, vz, ax, az, heading, turning
+    return x + vx * dt, z + vz * dt, vx, vz, ax, az, turned(heading, vx, vz, most), turning
 
 
 @kernel
 def stop(
     limits: Limits,
-    runs: bool,
     x: float,
     z: float,
     vx: float,
     vz: float,
     ax: float,
     az: float,
-    heading: float,
     dt: float,
     out: np.ndarray,
 ) -> int:
@@ -132,7 +159,7 @@ def stop(
     out[0, 0], out[0, 1] = x, z
     n = 1
     while n < len(out) and (vx != 0.0 or vz != 0.0):
-        x, z, vx, vz, ax, az, heading, _ = advance(limits, runs, x, z, vx, vz, ax, az, heading, 0.0, 0.0, 0.0, dt)
+        x, z, vx, vz, ax, az = brake(limits, x, z, vx, vz, ax, az, dt)
         out[n, 0], out[n, 1] = x, z
         n += 1
     return n
