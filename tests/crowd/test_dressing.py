@@ -83,7 +83,7 @@ def test_our_own_crowd_comes_back(formula_database):
     order = np.lexsort((times, ids))
     source = Trajectories(ids=ids[order], times=times[order], positions=places[order])
     found = dress(formula_database, source)
-    assert found.mean_distance < 0.02
+    assert found.mean_distance < 0.03
     for one in found.people:
         assert len(source.positions[source.rows(one.person)]) == one.frames
         assert gap(one, source, 30.0).mean() < 0.1

@@ -12,7 +12,7 @@ from jaxtyping import Float
 from stridecast.errors import InputError
 from stridecast.model.scene import Scene
 from stridecast.model.trajectories import Trajectories
-from stridecast.scorecard.clock import tracks
+from stridecast.scorecard.clock import SAME_MOMENT, tracks
 from stridecast.scorecard.density import SpeedDensity, speed_density
 from stridecast.scorecard.limits import RESOLUTION, TOLERANCE, Bounds, Violation, as_bounds, violations
 from stridecast.scorecard.overlaps import Overlaps, overlaps, overlaps_with_solids
@@ -189,7 +189,7 @@ def score_crowd(
     )
     solids = Solids(scene)
     before = np.where(np.isfinite(way.arrivals), way.arrivals, np.inf)
-    on_the_way = on_clock.trajectories.times < before[on_clock.owners]
+    on_the_way = on_clock.trajectories.times < before[on_clock.owners] - SAME_MOMENT
     return CrowdScore(
         people=len(people),
         samples=len(on_clock.trajectories),
