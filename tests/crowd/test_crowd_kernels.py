@@ -12,11 +12,12 @@ from shapely.ops import substring
 import crowds
 from crowds import LIMITS, corridor, ground, somebody, traffic_of
 from stridecast.crowd import choice_kernels, neighbour_kernels, rule_kernels, rules, way_kernels
+from stridecast.crowd.decision_kernels import cheapest, mixed
 from stridecast.crowd.ground import make_cells
 from stridecast.crowd.ground_kernels import disc_way, free_way, room, standing_near
 from stridecast.crowd.neighbour_kernels import EX, EZ, FELLOW, HX, HZ, PX, PZ, RADIUS, RANK, ROW, VX, VZ
 from stridecast.crowd.safety_kernels import apart
-from stridecast.crowd.step_kernels import cheapest, make_scratch, mixed
+from stridecast.crowd.step_kernels import make_scratch
 from stridecast.crowd.vehicle_kernels import advance, stop
 
 SEEDS = st.integers(0, 2**32 - 1)
