@@ -90,7 +90,7 @@ def decide(
     costs: np.ndarray,
 ) -> None:
     """Rule and costs of what somebody may do next; out of a jam if need be."""
-    moving.jammed_next[c] = moving.retreat[c] > 0.0
+    moving.jammed_next[c] = moving.jammed[c] if moving.retreat[c] > 0.0 else 0.0
     moving.opposed[c] = False
     if wish < REST:
         moving.rule[c], moving.other[c], moving.contact[c], moving.chosen_side[c] = STAND, -1, np.inf, 0.0
@@ -119,12 +119,17 @@ def decide(
         if moving.stuck[c] > STUCK:
             gap, moving.opposed[c], jammed = in_front(moving, seen, count, c, people.radius[c], dx, dz)
             wedged = gap < TIGHT and moving.stuck[c] > WEDGED * (1.0 + people.rank[c])
-            moving.jammed_next[c] = jammed or moving.opposed[c] or wedged
-            if not moving.jammed_next[c]:
+            jammed = max(jammed, 1.0 if moving.opposed[c] else 0.5 if wedged else 0.0)
+            moving.jammed_next[c] = jammed
+            back = (
+                jammed > 0.0
+                and gap < ROOM
+                and luck < STEPPING_BACK
+                and room_in(seen, count, people.radius[c], -dx, -dz) > ROOM
+            )
+            if jammed == 0.0:
                 patience *= QUEUING
-            else:
-                narrow = gap < ROOM
-                back = narrow and luck < STEPPING_BACK and room_in(seen, count, people.radius[c], -dx, -dz) > ROOM
+            elif back or jammed == 1.0:
                 if back:
                     dx, dz = -dx, -dz
                 else:
@@ -170,9 +175,9 @@ def decide(
 @kernel
 def in_front(
     moving: Moving, seen: np.ndarray, count: int, c: int, radius: float, dx: float, dz: float
-) -> tuple[float, bool, bool]:
-    """Gap to the nearest one in front, whether somebody there wants to go elsewhere, whether somebody is jammed."""
-    nearest, opposed, jammed = BLOCKED, False, False
+) -> tuple[float, bool, float]:
+    """Gap to the nearest one in front, whether somebody there wants to go elsewhere, how jammed somebody is."""
+    nearest, opposed, jammed = BLOCKED, False, 0.0
     for m in range(count):
         o = seen[m]
         away = math.hypot(o[PX], o[PZ])
@@ -180,7 +185,7 @@ def in_front(
         if gap < BLOCKED and o[PX] * dx + o[PZ] * dz > CONE * away:
             nearest = min(nearest, gap)
             opposed = opposed or o[BX] * moving.bound[c, 0] + o[BZ] * moving.bound[c, 1] < OPPOSED
-            jammed = jammed or o[JAMMED] > 0.0
+            jammed = max(jammed, o[JAMMED])
     return nearest, opposed, jammed
 
 

@@ -99,7 +99,7 @@ def look(people: People, moving: Moving, cells: Cells, c: int, reach: float, scr
         out[RANK] = people.rank[j]
         out[ROW] = j
         out[BX], out[BZ] = moving.bound[j, 0], moving.bound[j, 1]
-        out[JAMMED] = 1.0 if moving.jammed[j] else 0.0
+        out[JAMMED] = moving.jammed[j]
         out[HX], out[HZ] = math.sin(moving.heading[j]), math.cos(moving.heading[j])
     return n
 

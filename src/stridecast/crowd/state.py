@@ -69,7 +69,7 @@ class Moving(NamedTuple):
     chosen_side: Array  # N, 1 left, -1 right, 0 none
     since: Array  # N, how long this encounter lasts, seconds
     stuck: Array  # N, how long somebody who wants to go has not got on, seconds
-    jammed: Array  # N, stands where people who want to go in other directions block each other
+    jammed: Array  # N, 1 where people who want to go in other directions block each other, 0.5 where they are wedged
     jammed_next: Array  # N, the same after this frame
     opposed: Array  # N, faces somebody there who wants to go the other way
     retreat: Array  # N, so long they still give way, seconds
@@ -160,8 +160,8 @@ def make_moving(count: int, frames: int) -> Moving:
         chosen_side=zeros(),
         since=zeros(),
         stuck=zeros(),
-        jammed=np.zeros(count, np.bool_),
-        jammed_next=np.zeros(count, np.bool_),
+        jammed=zeros(),
+        jammed_next=zeros(),
         opposed=np.zeros(count, np.bool_),
         retreat=zeros(),
         retreat_way=zeros(2),
