@@ -11,7 +11,7 @@ from stridecast.crowd.neighbour_kernels import BX, BZ, JAMMED, PX, PZ, RADIUS
 from stridecast.crowd.rule_kernels import answer
 from stridecast.crowd.rules import GIVE_WAY, ON_THE_WAY, RETURN, STAND, WAIT
 from stridecast.crowd.state import Ground, Moving, People, Ways
-from stridecast.crowd.vehicle_kernels import REST
+from stridecast.crowd.vehicle_kernels import BACK, REST
 from stridecast.crowd.way_kernels import place_at, room_in, round_the_jam, way_out
 from stridecast.geometry.kernels import kernel
 
@@ -36,6 +36,9 @@ ROOM = 0.4
 
 STEPPING_BACK, STEP_BACK = 0.6, 1.5
 """... so this part of those who have less step back, for so long (seconds) ..."""
+
+A_BIT = 0.06
+"""Who is wedged steps back by as little as this, metres."""
 
 CONTRARY = 0.1
 """So many of them go to the other side."""
@@ -118,14 +121,16 @@ def decide(
         patience = (0.6 if people.waits[c] else 1.0) * PATIENCE * (1.0 + 2.0 * people.rank[c])
         if moving.stuck[c] > STUCK:
             gap, moving.opposed[c], jammed = in_front(moving, seen, count, c, people.radius[c], dx, dz)
-            wedged = gap < TIGHT and moving.stuck[c] > WEDGED * (1.0 + people.rank[c])
+            close = gap < TIGHT or gap >= BLOCKED  # or held fast from the side
+            wedged = close and moving.stuck[c] > WEDGED * (1.0 + people.rank[c])
             jammed = max(jammed, 1.0 if moving.opposed[c] else 0.5 if wedged else 0.0)
             moving.jammed_next[c] = jammed
+            behind = room_in(seen, count, people.radius[c], -dx, -dz)
             back = (
                 jammed > 0.0
-                and gap < ROOM
+                and (gap < ROOM or close)
                 and luck < STEPPING_BACK
-                and room_in(seen, count, people.radius[c], -dx, -dz) > ROOM
+                and behind > (ROOM if jammed == 1.0 else A_BIT)
             )
             if jammed == 0.0:
                 patience *= QUEUING
@@ -138,7 +143,7 @@ def decide(
                         own = -own
                     x, z = moving.position[c, 0], moving.position[c, 1]
                     dx, dz = round_the_jam(ground, things, standing, x, z, people.radius[c], dx, dz, own)
-                moving.retreat[c] = STEP_BACK if back else GOING_ROUND * (0.6 + 0.8 * luck)
+                moving.retreat[c] = min(STEP_BACK, behind / BACK) if back else GOING_ROUND * (0.6 + 0.8 * luck)
                 moving.retreat_way[c, 0], moving.retreat_way[c, 1] = dx, dz
                 rule, most, side = GIVE_WAY, np.inf, 0.0
                 moving.stuck[c] = 0.5 * STUCK
