@@ -56,7 +56,7 @@ def crowd(
     if seed is not None and not 0 <= seed < 2**32:
         raise InputError(f"--seed must be a whole number from 0 to {2**32 - 1}, not {seed}")
     place = load_scene(scene)
-    files = CrowdFiles(output)
+    files = CrowdFiles(output, movers=len(place.movers))
     learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {"ways": "finding ways", "bake": "walking"}) as progress:
         people = Crowd(
@@ -98,6 +98,8 @@ def _write_frame(files: CrowdFiles, frame: CrowdFrame) -> None:
 
     speeds = np.linalg.norm(frame.velocities, axis=-1)
     files.add_rows(frame.ids, np.full(len(frame.ids), frame.time), frame.positions, frame.headings, speeds)
+    if len(frame.movers):
+        files.add_movers(frame.time, frame.movers)
 
 
 def _tell(baking: Baking, files: CrowdFiles) -> None:

@@ -7,6 +7,7 @@ import io
 import re
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from types import TracebackType
@@ -18,9 +19,11 @@ from jaxtyping import Float, Int
 from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
 from stridecast.formats.files import check_place
+from stridecast.formats.trajectories import load_trajectories
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
 from stridecast.geometry import ground
 from stridecast.model.motion import Motion
+from stridecast.model.scene import Scene
 
 Array = np.ndarray
 
@@ -105,6 +108,8 @@ class CrowdFiles:
         Everybody's places: ``id,time,x,y,heading,speed``.
     ``x.bvh``
         ``x.csv``, and for each person ``x.NAME.bvh``; ``x.people.csv`` tells whose is which, and when each begins.
+    ``x.movers.csv``
+        Beside each of these, where the obstacles were that move; they wait for people (see ``moved_as_written``).
 
     Rows are written as they come, to ``x.part.csv`` and ``x.people.part.csv``, which take their names at the end. Where
     an error ends the context before, they stay as they are, and so does each BVH.
@@ -113,6 +118,8 @@ class CrowdFiles:
     ----------
     output
         A name as above.
+    movers
+        So many obstacles move.
 
     Raises
     ------
@@ -120,11 +127,12 @@ class CrowdFiles:
         Another ending, or the file system refuses.
     """
 
-    def __init__(self, output: str | Path) -> None:
+    def __init__(self, output: str | Path, *, movers: int = 0) -> None:
         self.output = Path(output)
         self.bodies = kind_of(self.output) == ".bvh"
         self.table = self.output.with_suffix(".csv") if self.bodies else self.output
         self.index = self.output.with_suffix(".people.csv") if self.bodies else None
+        self.movers = movers_of(self.output) if movers else None
         self.motions: list[Path] = []
         self.kept: list[Path] = []
         self._names: set[str] = set()
@@ -134,6 +142,8 @@ class CrowdFiles:
         self._parts.append(PartFile(self.table, "id,time,x,y,heading,speed"))
         if self.index is not None:
             self._parts.append(PartFile(self.index, "id,name,start,seconds,frames,height,file"))
+        if self.movers is not None:
+            self._parts.append(PartFile(self.movers, "id,time,x,y"))
         return self
 
     def __exit__(
@@ -160,7 +170,7 @@ class CrowdFiles:
     @property
     def files(self) -> tuple[Path, ...]:
         """Everything that is written, without the motions."""
-        return tuple(path for path in (self.table, self.index) if path is not None)
+        return tuple(path for path in (self.table, self.index, self.movers) if path is not None)
 
     def add_rows(
         self,
@@ -175,6 +185,11 @@ class CrowdFiles:
         x, y = positions[:, 0] + 0.0, 0.0 - positions[:, 1]
         columns = (ids.tolist(), times.tolist(), x.tolist(), y.tolist(), angles.tolist(), speeds.tolist())
         self._parts[0].add("".join([ROW % row for row in zip(*columns, strict=True)]))
+
+    def add_movers(self, time: float, places: Float[Array, "movers 2"]) -> None:
+        """Add where moving obstacles are, ground points, in the order of the scene."""
+        rows = [f"{k + 1},{time:.9f},{x:.8f},{0.0 - z:.8f}\n" for k, (x, z) in enumerate(places.tolist())]
+        self._parts[-1].add("".join(rows))
 
     def add_motion(self, number: int, name: str, start: float, motion: Motion, height: float) -> Path:
         """Write somebody's motion and its row of the index; ``start`` in seconds, ``height`` in metres."""
@@ -192,6 +207,35 @@ class CrowdFiles:
         word = next(word for word in words if word.casefold() not in self._names)
         self._names.add(word.casefold())
         return self.output.with_suffix(f".{word}.bvh")
+
+
+def movers_of(path: Path) -> Path:
+    """The file beside a table that tells where the moving obstacles of a scene were."""
+    return path.with_suffix(".movers.csv")
+
+
+def moved_as_written(scene: Scene, path: Path) -> Scene:
+    """The scene with its moving obstacles as they were while a table was written, if there is a file that tells.
+
+    They wait for people who are in their way, so that they may be later than the scene says.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or tells of other obstacles than the scene.
+    """
+    beside = movers_of(path)
+    if not (scene.movers and beside.exists()):
+        return scene
+    told = load_trajectories(beside)
+    if told.people.tolist() != list(range(1, len(scene.movers) + 1)):
+        raise FileError(f"tells of {len(told.people)} moving obstacles, the scene of {len(scene.movers)}", path=beside)
+    rows = [told.rows(k + 1) for k in range(len(scene.movers))]
+    moved = (
+        replace(mover, times=told.times[own], points=told.positions[own])
+        for mover, own in zip(scene.movers, rows, strict=True)
+    )
+    return replace(scene, movers=tuple(moved))
 
 
 def kind_of(output: str | Path) -> str:
