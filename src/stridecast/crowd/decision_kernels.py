@@ -34,8 +34,8 @@ STUCK = 0.7
 ROOM = 0.4
 """Behind people who block each other there should be so much room, metres ..."""
 
-STEPPING_BACK, STEP_BACK = 0.97, 6.0
-"""... so nearly all who have less step back, for so long (seconds) ..."""
+STEPPING_BACK, STEP_BACK, STEP_BACK_A_BIT = 0.97, 6.0, 1.5
+"""... so nearly all who have less step back, for so long; behind a wedge less; seconds ..."""
 
 A_BIT = 0.06
 """Who is wedged steps back by as little as this, metres."""
@@ -147,7 +147,8 @@ def decide(
                     if luck > 1.0 - CONTRARY:
                         own = -own
                     dx, dz = round_the_jam(ground, things, standing, x, z, people.radius[c], dx, dz, own)
-                moving.retreat[c] = min(STEP_BACK, behind / BACK) if back else GOING_ROUND * (0.6 + 0.8 * luck)
+                longest = STEP_BACK if jammed == 1.0 else STEP_BACK_A_BIT
+                moving.retreat[c] = min(longest, behind / BACK) if back else GOING_ROUND * (0.6 + 0.8 * luck)
                 moving.retreat_way[c, 0], moving.retreat_way[c, 1] = dx, dz
                 rule, most, side = GIVE_WAY, np.inf, 0.0
                 moving.stuck[c] = 0.5 * STUCK
