@@ -69,8 +69,8 @@ def build(
     Parameters
     ----------
     sources
-        Files and folders (searched to the bottom): BVH, AMC with its ASF, and AMASS. Motions in memory go the same way;
-        in the database and in messages their names stand in place of a file.
+        Files and folders (searched to the bottom): BVH, AMC with its ASF, AMASS, C3D. Motions in memory go the same
+        way; in the database and in messages their names stand in place of a file.
     skeleton
         Body that all motion is carried over to: a skeleton, or a BVH or ASF file. Left out: the body of the person with
         the most seconds.

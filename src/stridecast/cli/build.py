@@ -12,7 +12,7 @@ import typer
 def build(
     sources: Annotated[
         list[Path],
-        typer.Argument(help="Recordings (BVH, AMC with its ASF, AMASS) and folders of them.", show_default=False),
+        typer.Argument(help="Recordings (BVH, AMC with its ASF, AMASS, C3D) and folders of them.", show_default=False),
     ],
     output: Annotated[
         Path,
