@@ -23,15 +23,14 @@ if TYPE_CHECKING:
 SPEEDS = {"stand": 1.3, "walk": 1.3, "run": 3.0}
 """Usual speed along curves and paths, m/s."""
 
-OUTPUTS = (".bvh",)
-
 SLOWED_SHOWN = 5
 """So many places are told at which a plan is slower than asked for."""
 
 
 def walk(
     output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="OUT.bvh", help="The motion to write.", show_default=False)
+        Path,
+        typer.Option("--output", "-o", metavar="OUT.bvh|.usd[a|c]", help="The motion to write.", show_default=False),
     ],
     database: Database = None,
     points: Annotated[
@@ -86,15 +85,13 @@ def walk(
         raise FileError("the trace would overwrite another file of this walk", path=trace)
 
     from stridecast.cli import screen
-    from stridecast.formats.bvh import write_bvh
     from stridecast.formats.files import check_place, replacing
+    from stridecast.formats.motion_files import check_motion_place, write_motion
     from stridecast.formats.trace import trace_text
 
-    if output.suffix.lower() not in OUTPUTS:
-        raise FileError(f"motion is written as {', '.join(f'*{s}' for s in OUTPUTS)}", path=output)
-    for place in (output, trace):
-        if place is not None:
-            check_place(place)
+    check_motion_place(output)
+    if trace is not None:
+        check_place(trace)
     how: dict[str, Any] = {"subject": subject, "frame_rate": rate, "size": size}
     if style is not None:
         how["style"] = _style(style)
@@ -113,11 +110,11 @@ def walk(
         with screen.progress(quiet, words) as progress:
             journey = _followed(learned, stream, gains, how, progress)
     if trace is None:
-        write_bvh(output, journey.motion)
+        write_motion(output, journey.motion)
     else:
         with replacing(trace) as file:  # takes its place only once the motion has been written too
             file.write(trace_text(journey).encode())
-            write_bvh(output, journey.motion)
+            write_motion(output, journey.motion)
     summary = _summary(journey, walked, output, trace)
     if as_json:
         screen.print_json(summary)

@@ -19,12 +19,14 @@ from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
 from stridecast.formats.files import check_place
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
+from stridecast.formats.usd import ENDINGS as USD
+from stridecast.formats.usd import UsdScene, check_usd
 from stridecast.geometry import ground
 from stridecast.model.motion import Motion
 
 Array = np.ndarray
 
-OUTPUTS = (".csv", ".parquet", ".bvh")
+OUTPUTS = (".csv", ".parquet", ".bvh", *USD)
 """Endings of what a crowd is written as."""
 
 FLUSH = 1.0
@@ -105,6 +107,8 @@ class CrowdFiles:
         Everybody's places: ``id,time,x,y,heading,speed``.
     ``x.bvh``
         ``x.csv``, and for each person ``x.NAME.bvh``; ``x.people.csv`` tells whose is which, and when each begins.
+    ``x.usd``, ``x.usda``, ``x.usdc``
+        ``x.csv``, and everybody in one scene, which is written at the end.
 
     Rows are written as they come, to ``x.part.csv`` and ``x.people.part.csv``, which take their names at the end. Where
     an error ends the context before, they stay as they are, and so does each BVH.
@@ -122,9 +126,12 @@ class CrowdFiles:
 
     def __init__(self, output: str | Path) -> None:
         self.output = Path(output)
-        self.bodies = kind_of(self.output) == ".bvh"
+        kind = kind_of(self.output)
+        self.bodies = kind == ".bvh" or kind in USD
         self.table = self.output.with_suffix(".csv") if self.bodies else self.output
-        self.index = self.output.with_suffix(".people.csv") if self.bodies else None
+        self.index = self.output.with_suffix(".people.csv") if kind == ".bvh" else None
+        self._scene: UsdScene | None = None
+        self._in_scene = kind in USD
         self.motions: list[Path] = []
         self.kept: list[Path] = []
         self._names: set[str] = set()
@@ -149,6 +156,8 @@ class CrowdFiles:
             return
         for part in self._parts:
             part.close()
+        if self._in_scene:
+            (self._scene or UsdScene(30.0)).save(self.output)
         for part in self._parts:
             if part.path.suffix.lower() == ".parquet":
                 csv_to_parquet(part.part, part.path)
@@ -160,7 +169,8 @@ class CrowdFiles:
     @property
     def files(self) -> tuple[Path, ...]:
         """Everything that is written, without the motions."""
-        return tuple(path for path in (self.table, self.index) if path is not None)
+        scene = self.output if self._in_scene else None
+        return tuple(path for path in (scene, self.table, self.index) if path is not None)
 
     def add_rows(
         self,
@@ -178,6 +188,10 @@ class CrowdFiles:
 
     def add_motion(self, number: int, name: str, start: float, motion: Motion, height: float) -> Path:
         """Write somebody's motion and its row of the index; ``start`` in seconds, ``height`` in metres."""
+        if self._in_scene:
+            self._scene = self._scene or UsdScene(motion.frame_rate)
+            self._scene.add(motion, name=name, start=start)
+            return self.output
         path = self._place_of(number, name)
         write_bvh(path, motion)
         self.motions.append(path)
@@ -208,6 +222,8 @@ def kind_of(output: str | Path) -> str:
         raise FileError(f"a crowd is written as {', '.join(f'*{ending}' for ending in OUTPUTS)}", path=output)
     if kind == ".parquet":
         check_parquet(output)
+    if kind in USD:
+        check_usd(output)
     check_place(output)
     return kind
 
