@@ -70,6 +70,15 @@ def blender() -> str:
     return named or sys.executable
 
 
+@pytest.fixture(scope="session")
+def pedpy() -> str:
+    """A Python that has PedPy: ``STRIDECAST_PEDPY``, or this one."""
+    named = os.environ.get("STRIDECAST_PEDPY", "")
+    if not named and find_spec("pedpy") is None:
+        absent("pedpy", "no PedPy in this Python, and STRIDECAST_PEDPY names no other")
+    return named or sys.executable
+
+
 @pytest.fixture
 def unchecked() -> Iterator[None]:
     """Switch the type checks off, to see what the package itself says to arrays of the wrong shape."""
