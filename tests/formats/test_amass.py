@@ -10,16 +10,19 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner, Result
 
 import stridecast.formats.amass as amass
 from smpl_files import UP, amass_arrays, body_model, on_smpl, write_amass
 from stridecast.analysis.take import analyse
 from stridecast.body import kinematics
 from stridecast.building.build import build
+from stridecast.cli.main import app
 from stridecast.errors import FileError, TakeError
 from stridecast.formats.amass import read_amass
 from stridecast.formats.recordings import load_motion, load_recording
 from stridecast.formats.smpl import BODY, MODELS, joint_parents, mean_skeleton, read_body_model
+from stridecast.formats.store import load_database
 from stridecast.geometry import quaternions as quat
 from stridecast.model.motion import Motion
 from stridecast.samples.corpus import RECIPES, sample_take
@@ -373,3 +376,17 @@ def test_no_take_is_read_where_nobody_walks(tmp_path):
 
 def test_up_is_what_it_says():
     np.testing.assert_allclose(quat.rotate(UP, np.array([0.0, 1.0, 0.0])), [0.0, 0.0, 1.0], atol=1e-12)
+
+
+def test_the_command_takes_a_body_model(tmp_path):
+    take, out = write_amass(tmp_path / "walk_turns.npz", walked()), tmp_path / "out.safetensors"
+    model = body_model(tmp_path / "model.npz", scale=1.05)
+
+    def call(*words: object) -> Result:
+        return CliRunner().invoke(app, [str(word) for word in ("build", take, "-o", out, "--jobs", 1, *words)])
+
+    assert call("--body-model", model).exit_code == 0
+    assert load_database(out).skeleton.leg_length == pytest.approx(1.05 * walked().skeleton.leg_length)
+    wrong = call("--body-model", take)
+    assert wrong.exit_code == 2
+    assert "walk_turns.npz: is no body model: it lacks v_template" in wrong.stderr

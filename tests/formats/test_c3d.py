@@ -322,3 +322,16 @@ def test_a_motion_on_another_floor_is_the_same(tmp_path):
     )
     np.testing.assert_allclose(other.root_positions - one.root_positions, [[3.0, 0.4, -2.0]] * 120, atol=1e-4)
     np.testing.assert_allclose(other.skeleton.offsets, one.skeleton.offsets, atol=1e-5)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_markers_on_recorded_people(mocap, tmp_path, noise):
+    motion = load_motion(mocap / "cmu" / "16" / "16_31.amc")
+    rng = np.random.default_rng(0)
+    places = {name: place + noise * rng.normal(size=place.shape) for name, place in marker_places(motion).items()}
+    loaded = load_motion(write_c3d(tmp_path / "a.c3d", places, motion.frame_rate))
+    here, there = analyse(motion), analyse(loaded)
+    assert np.mean(here.contacts.planted == there.contacts.planted) > 0.98
+    assert len(here.gait.segments) == len(there.gait.segments)
+    # its hips are the middle of the hip joints, those of the recording lie before them
+    np.testing.assert_allclose(there.vehicle.positions, here.vehicle.positions, atol=0.06)
