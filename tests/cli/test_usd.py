@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from bodies import standing
 from stridecast.cli.main import app
+from stridecast.formats.crowd_files import CrowdFiles
 from stridecast.formats.recordings import load_motion
 from stridecast.formats.store import save_database
 from stridecast.formats.trajectories import load_trajectories
@@ -89,3 +91,25 @@ def test_dressed_trajectories(database, tmp_path):
         rows = tracks.rows(int(name[1:]))
         np.testing.assert_allclose(own[:, 0] / 30.0, tracks.times[rows], atol=1e-6)
         assert np.linalg.norm(own[:, [1, 3]] - tracks.positions[rows], axis=-1).max() < 0.15
+
+
+def stopped(files: CrowdFiles) -> None:
+    with files:
+        files.add_motion(1, "Ann", 0.5, standing(), 1.7)
+        raise KeyboardInterrupt
+
+
+def test_who_had_left_is_kept(tmp_path):
+    out = tmp_path / "out.usda"
+    out.write_text("old")
+    for name in ("out.part.usda", "out.part2.usda"):
+        files = CrowdFiles(out)
+        with pytest.raises(KeyboardInterrupt):
+            stopped(files)
+        assert [path.name for path in files.kept][-1] == name
+        assert list(roots(tmp_path / name)) == ["Ann"]
+    assert out.read_text() == "old"
+    empty = CrowdFiles(tmp_path / "none.usda")
+    with empty:
+        pass
+    assert roots(tmp_path / "none.usda") == {}

@@ -7,6 +7,7 @@ import io
 import re
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from types import TracebackType
@@ -108,7 +109,7 @@ class CrowdFiles:
     ``x.bvh``
         ``x.csv``, and for each person ``x.NAME.bvh``; ``x.people.csv`` tells whose is which, and when each begins.
     ``x.usd``, ``x.usda``, ``x.usdc``
-        ``x.csv``, and everybody in one scene, which is written at the end.
+        ``x.csv``, and everybody in one scene, which is written at the end; what an error leaves is ``x.part.usd``.
 
     Rows are written as they come, to ``x.part.csv`` and ``x.people.part.csv``, which take their names at the end. Where
     an error ends the context before, they stay as they are, and so does each BVH.
@@ -153,6 +154,7 @@ class CrowdFiles:
                     part.close()
                 except FileError:  # the disk is full, say: what ended it all is more to the point
                     continue
+            self._keep_scene()
             return
         for part in self._parts:
             part.close()
@@ -165,6 +167,17 @@ class CrowdFiles:
             else:
                 part.rename()
             self.kept.remove(part.part)
+
+    def _keep_scene(self) -> None:
+        """Write who has left until now beside the scene that is not finished."""
+        if self._scene is None:
+            return
+        ending = self.output.suffix
+        names = (self.output.with_suffix(f".part{k if k > 1 else ''}{ending}") for k in count(1))
+        part = next(name for name in names if not name.exists())
+        with suppress(FileError):
+            self._scene.save(part)
+            self.kept.append(part)
 
     @property
     def files(self) -> tuple[Path, ...]:
