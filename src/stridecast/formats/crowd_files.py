@@ -7,6 +7,7 @@ import io
 import re
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
@@ -21,13 +22,15 @@ from stridecast.formats.bvh import write_bvh
 from stridecast.formats.files import check_place
 from stridecast.formats.trajectories import load_trajectories
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
+from stridecast.formats.usd import ENDINGS as USD
+from stridecast.formats.usd import UsdScene, check_usd
 from stridecast.geometry import ground
 from stridecast.model.motion import Motion
 from stridecast.model.scene import Scene
 
 Array = np.ndarray
 
-OUTPUTS = (".csv", ".parquet", ".bvh")
+OUTPUTS = (".csv", ".parquet", ".bvh", *USD)
 """Endings of what a crowd is written as."""
 
 FLUSH = 1.0
@@ -108,6 +111,8 @@ class CrowdFiles:
         Everybody's places: ``id,time,x,y,heading,speed``.
     ``x.bvh``
         ``x.csv``, and for each person ``x.NAME.bvh``; ``x.people.csv`` tells whose is which, and when each begins.
+    ``x.usd``, ``x.usda``, ``x.usdc``
+        ``x.csv``, and everybody in one scene, which is written at the end; what an error leaves is ``x.part.usd``.
     ``x.movers.csv``
         Beside each of these, where the obstacles were that move; they wait for people (see ``moved_as_written``).
 
@@ -129,10 +134,13 @@ class CrowdFiles:
 
     def __init__(self, output: str | Path, *, movers: int = 0) -> None:
         self.output = Path(output)
-        self.bodies = kind_of(self.output) == ".bvh"
+        kind = kind_of(self.output)
+        self.bodies = kind == ".bvh" or kind in USD
         self.table = self.output.with_suffix(".csv") if self.bodies else self.output
-        self.index = self.output.with_suffix(".people.csv") if self.bodies else None
         self.movers = movers_of(self.output) if movers else None
+        self.index = self.output.with_suffix(".people.csv") if kind == ".bvh" else None
+        self._scene: UsdScene | None = None
+        self._in_scene = kind in USD
         self.motions: list[Path] = []
         self.kept: list[Path] = []
         self._names: set[str] = set()
@@ -156,9 +164,12 @@ class CrowdFiles:
                     part.close()
                 except FileError:  # the disk is full, say: what ended it all is more to the point
                     continue
+            self._keep_scene()
             return
         for part in self._parts:
             part.close()
+        if self._in_scene:
+            (self._scene or UsdScene(30.0)).save(self.output)
         for part in self._parts:
             if part.path.suffix.lower() == ".parquet":
                 csv_to_parquet(part.part, part.path)
@@ -167,10 +178,22 @@ class CrowdFiles:
                 part.rename()
             self.kept.remove(part.part)
 
+    def _keep_scene(self) -> None:
+        """Write who has left until now beside the scene that is not finished."""
+        if self._scene is None:
+            return
+        ending = self.output.suffix
+        names = (self.output.with_suffix(f".part{k if k > 1 else ''}{ending}") for k in count(1))
+        part = next(name for name in names if not name.exists())
+        with suppress(FileError):
+            self._scene.save(part)
+            self.kept.append(part)
+
     @property
     def files(self) -> tuple[Path, ...]:
         """Everything that is written, without the motions."""
-        return tuple(path for path in (self.table, self.index, self.movers) if path is not None)
+        scene = self.output if self._in_scene else None
+        return tuple(path for path in (scene, self.table, self.index, self.movers) if path is not None)
 
     def add_rows(
         self,
@@ -193,6 +216,10 @@ class CrowdFiles:
 
     def add_motion(self, number: int, name: str, start: float, motion: Motion, height: float) -> Path:
         """Write somebody's motion and its row of the index; ``start`` in seconds, ``height`` in metres."""
+        if self._in_scene:
+            self._scene = self._scene or UsdScene(motion.frame_rate)
+            self._scene.add(motion, name=name, start=start)
+            return self.output
         path = self._place_of(number, name)
         write_bvh(path, motion)
         self.motions.append(path)
@@ -252,6 +279,8 @@ def kind_of(output: str | Path) -> str:
         raise FileError(f"a crowd is written as {', '.join(f'*{ending}' for ending in OUTPUTS)}", path=output)
     if kind == ".parquet":
         check_parquet(output)
+    if kind in USD:
+        check_usd(output)
     check_place(output)
     return kind
 
