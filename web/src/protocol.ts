@@ -299,8 +299,8 @@ export interface ExplainMessage {
 /**
  * Make a file of what was played in this mode; answered by ``export_ready``.
  *
- * ``bvh`` is a zip of a BVH a person (walk mode: one BVH), ``glb`` the figures in motion, ``csv`` everybody's ways (walk
- * mode: the trace), ``database`` what was built.
+ * ``bvh`` is a zip of a BVH a person (walk mode: one BVH), ``glb`` the figures in motion, ``csv`` everybody's ways
+ * (walk mode: the trace), ``database`` what was built.
  */
 export interface ExportMessage {
   type: "export";
@@ -452,7 +452,8 @@ export type FromClient = WishMessage | SettingsMessage | PlaceMessage | ModeMess
 /**
  * Bounds of a group: jerk (m/s3), tangential acceleration (m/s2), turning (1/s) and speed (m/s).
  *
- * Pairs are least and greatest; of pairs of pairs the first is at the first frame of a segment, the second at the last.
+ * Pairs are least and greatest; of pairs of pairs the first is at the first frame of a segment, the second at the
+ * last.
  */
 export interface BoundsPart {
   jerk: number;
@@ -473,7 +474,7 @@ export interface Built {
   motions: string[];
 }
 
-/** Answer to ``clip`` and ``mine``: the player shows figure 1, as played, and figure 2, as recorded (if ``beside``). */
+/** Answer to ``clip`` and ``mine``: figure 1 is shown as played, and figure 2 as recorded if ``beside``. */
 export interface ClipReady {
   type: "clip_ready";
   request: number;
@@ -516,8 +517,8 @@ export interface DatabaseState {
 /**
  * Something went wrong and nothing has changed; ``message`` says what and what would be right.
  *
- * ``code``: ``message`` (no JSON, or none of the messages), ``wish``, ``scene``, ``database``, ``build``, ``cancelled``,
- * ``export``, ``rate`` (too many messages; some were left out), ``busy``, ``internal``.
+ * ``code``: ``message`` (no JSON, or none of the messages), ``wish``, ``scene``, ``database``, ``build``,
+ * ``cancelled``, ``export``, ``rate`` (too many messages; some were left out), ``busy``, ``internal``.
  */
 export interface ErrorMessage {
   type: "error";
@@ -548,8 +549,8 @@ export interface ExampleColumns {
 /**
  * Scene mode: what somebody is up to. ``gone`` when they have left.
  *
- * ``window`` is where they would be if they braked from now on (what they have reserved), ``path`` the way that is left,
- * ``target`` the velocity they aim at (m/s), ``contact_in`` seconds or nothing where they would not meet.
+ * ``window`` is where they would be if they braked from now on (what they have reserved), ``path`` the way that is
+ * left, ``target`` the velocity they aim at (m/s), ``contact_in`` seconds or nothing where they would not meet.
  */
 export interface ExplanationMessage {
   type: "explanation";
@@ -655,8 +656,8 @@ export interface PeopleMessage {
 /**
  * Scene and database mode: the player, a few times a second while it plays and whenever it changes.
  *
- * ``first`` to ``last`` is what can be scrubbed, seconds. The counts are of people: have come, are there, have arrived,
- * wait outside for room, found no way.
+ * ``first`` to ``last`` is what can be scrubbed, seconds. The counts are of people: have come, are there, have
+ * arrived, wait outside for room, found no way.
  */
 export interface PlayerState {
   type: "player";
@@ -691,8 +692,8 @@ export interface Progress {
 /**
  * Answer to ``scene``. ``applied``: ``live`` (people go on), ``restarted``, ``kept`` (nothing that plays changed).
  *
- * ``refused``: ``message`` says what is wrong and ``place`` where, such as ``people[2].behavior.velocity``; what plays is
- * as it was. ``empty``: right so far, but nobody is there to play it.
+ * ``refused``: ``message`` says what is wrong and ``place`` where, such as ``people[2].behavior.velocity``; what plays
+ * is as it was. ``empty``: right so far, but nobody is there to play it.
  */
 export interface SceneChecked {
   type: "scene_checked";
@@ -739,7 +740,7 @@ export interface SkeletonPart {
   height: number;
 }
 
-/** Somebody of the crowd: ``scale`` is their height as a part of the skeleton's, ``radius`` that of their disc (m). */
+/** Somebody of the crowd: height as a part of the skeleton's, and radius of the disc (m). */
 export interface Somebody {
   id: number;
   name: string;

@@ -73,10 +73,10 @@ class Figures:
 def pack_rotations(rotations: Float[Array, "*shape 4"]) -> UInt16[Array, "*shape 3"]:
     """Unit quaternions ``w x y z`` in six bytes each.
 
-    The greatest component is left out and its place (0 to 3) kept in two bits; the other three are divided by it, and the
-    angle of that quotient, -45 to 45 degrees, is rounded to one of ``2 * LEVELS + 1`` steps. That is finer than the
-    components themselves would be, and off by less than 1e-4 rad everywhere. The first two of the three numbers carry the
-    upper and the lower bit of the place as their highest bit.
+    The greatest component is left out and its place (0 to 3) kept in two bits; the other three are divided by it, and
+    the angle of that quotient, -45 to 45 degrees, is rounded to one of ``2 * LEVELS + 1`` steps. That is finer than the
+    components themselves would be, and off by less than 1e-4 rad everywhere. The first two of the three numbers carry
+    the upper and the lower bit of the place as their highest bit.
     """
     flat = np.asarray(rotations, np.float64).reshape(-1, 4)
     rows = np.arange(len(flat))

@@ -41,7 +41,7 @@ the first.
 
 
 class Column(NamedTuple):
-    """An array of a frame: so many rows (a name of the header's, or 1), so many numbers each, times ``joints`` or not."""
+    """An array of a frame: ``rows`` (1, or a number in the header) of ``width`` numbers, times ``joints`` or not."""
 
     name: str
     kind: str
@@ -60,8 +60,8 @@ STEERING = (
 across its direction (m/s2) and how that changed (m/s3), the bounds in force for these, and generic time, 0 to 1."""
 
 PLAYING = ("clamped", "group", "segment", "made_up")
-"""Of walk frames: bits of the bounds that acted (see ``CLAMPED``), the group that plays, how many segments have begun, and
-how many transitions had to be made up."""
+"""Of walk frames: bits of the bounds that acted (see ``CLAMPED``), the group that plays, how many segments have begun,
+and how many transitions had to be made up."""
 
 CLAMPED = ("jerk", "tangential", "lateral", "speed")
 """Bit ``k`` of ``clamped`` stands for ``CLAMPED[k]``."""

@@ -265,8 +265,8 @@ class UseMessage(Part):
 class ExportMessage(Part):
     """Make a file of what was played in this mode; answered by ``export_ready``.
 
-    ``bvh`` is a zip of a BVH a person (walk mode: one BVH), ``glb`` the figures in motion, ``csv`` everybody's ways (walk
-    mode: the trace), ``database`` what was built.
+    ``bvh`` is a zip of a BVH a person (walk mode: one BVH), ``glb`` the figures in motion, ``csv`` everybody's ways
+    (walk mode: the trace), ``database`` what was built.
     """
 
     type: Literal["export"]
@@ -314,7 +314,8 @@ FromClient = Annotated[
 class BoundsPart(Part):
     """Bounds of a group: jerk (m/s3), tangential acceleration (m/s2), turning (1/s) and speed (m/s).
 
-    Pairs are least and greatest; of pairs of pairs the first is at the first frame of a segment, the second at the last.
+    Pairs are least and greatest; of pairs of pairs the first is at the first frame of a segment, the second at the
+    last.
     """
 
     jerk: float
@@ -444,8 +445,8 @@ class Health(Part):
 class SceneChecked(Part):
     """Answer to ``scene``. ``applied``: ``live`` (people go on), ``restarted``, ``kept`` (nothing that plays changed).
 
-    ``refused``: ``message`` says what is wrong and ``place`` where, such as ``people[2].behavior.velocity``; what plays is
-    as it was. ``empty``: right so far, but nobody is there to play it.
+    ``refused``: ``message`` says what is wrong and ``place`` where, such as ``people[2].behavior.velocity``; what plays
+    is as it was. ``empty``: right so far, but nobody is there to play it.
     """
 
     type: Literal["scene_checked"] = "scene_checked"
@@ -474,8 +475,8 @@ class SceneSaved(Part):
 class PlayerState(Part):
     """Scene and database mode: the player, a few times a second while it plays and whenever it changes.
 
-    ``first`` to ``last`` is what can be scrubbed, seconds. The counts are of people: have come, are there, have arrived,
-    wait outside for room, found no way.
+    ``first`` to ``last`` is what can be scrubbed, seconds. The counts are of people: have come, are there, have
+    arrived, wait outside for room, found no way.
     """
 
     type: Literal["player"] = "player"
@@ -494,7 +495,7 @@ class PlayerState(Part):
 
 
 class Somebody(Part):
-    """Somebody of the crowd: ``scale`` is their height as a part of the skeleton's, ``radius`` that of their disc (m)."""
+    """Somebody of the crowd: height as a part of the skeleton's, and radius of the disc (m)."""
 
     id: int
     name: str
@@ -517,8 +518,8 @@ class PeopleMessage(Part):
 class ExplanationMessage(Part):
     """Scene mode: what somebody is up to. ``gone`` when they have left.
 
-    ``window`` is where they would be if they braked from now on (what they have reserved), ``path`` the way that is left,
-    ``target`` the velocity they aim at (m/s), ``contact_in`` seconds or nothing where they would not meet.
+    ``window`` is where they would be if they braked from now on (what they have reserved), ``path`` the way that is
+    left, ``target`` the velocity they aim at (m/s), ``contact_in`` seconds or nothing where they would not meet.
     """
 
     type: Literal["explanation"] = "explanation"
@@ -595,7 +596,7 @@ class MixPart(Part):
 
 
 class ClipReady(Part):
-    """Answer to ``clip`` and ``mine``: the player shows figure 1, as played, and figure 2, as recorded (if ``beside``)."""
+    """Answer to ``clip`` and ``mine``: figure 1 is shown as played, and figure 2 as recorded if ``beside``."""
 
     type: Literal["clip_ready"] = "clip_ready"
     request: int
@@ -660,8 +661,8 @@ class Pong(Part):
 class ErrorMessage(Part):
     """Something went wrong and nothing has changed; ``message`` says what and what would be right.
 
-    ``code``: ``message`` (no JSON, or none of the messages), ``wish``, ``scene``, ``database``, ``build``, ``cancelled``,
-    ``export``, ``rate`` (too many messages; some were left out), ``busy``, ``internal``.
+    ``code``: ``message`` (no JSON, or none of the messages), ``wish``, ``scene``, ``database``, ``build``,
+    ``cancelled``, ``export``, ``rate`` (too many messages; some were left out), ``busy``, ``internal``.
     """
 
     type: Literal["error"] = "error"

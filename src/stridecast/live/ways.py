@@ -1,0 +1,104 @@
+"""Lines drawn by hand: joined to where the walker is, and run along by a point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from stridecast.errors import PathError
+from stridecast.geometry import ground
+from stridecast.model.pose import Pose
+
+Array = np.ndarray
+
+SPACING = 0.1
+"""Points of a drawn line that lie closer together tell nothing, metres."""
+
+JOINED = 0.3
+"""A line that begins nearer to the walker than this begins at the walker, metres."""
+
+ASIDE = np.radians(60)
+"""A line that begins further aside than this is reached by a turn ahead of the walker, ..."""
+
+TURN = 0.7
+"""... which begins so far ahead, metres."""
+
+AHEAD = 0.8
+"""The point waits when it is further ahead than the walker is used to keep behind, and this, metres."""
+
+SHORTEST = 0.3
+"""A shorter line is no way, metres."""
+
+
+def way_of(
+    position: Float[Array, "2"], heading: float, speed: float, drawn: Sequence[tuple[float, float]]
+) -> Float[Array, "points 2"]:
+    """A drawn line from where the walker is.
+
+    Parameters
+    ----------
+    position, heading, speed
+        Of the walker, metres, radians and m/s.
+    drawn
+        Points as they were drawn, metres.
+
+    Raises
+    ------
+    PathError
+        It is too short.
+    """
+    points = np.array(drawn, np.float64)
+    kept = [points[0]]
+    for point in points[1:]:
+        if np.hypot(*(point - kept[-1])) >= SPACING:
+            kept.append(point)
+    line = np.array(kept)
+    if np.hypot(*(line[0] - position)) < JOINED and len(line) > 1:
+        line = line[1:]
+    length = float(np.linalg.norm(np.diff(np.concatenate((position[None], line)), axis=0), axis=-1).sum())
+    if length < SHORTEST:
+        raise PathError(f"the line is {length:.2f} m long from where the walker is; draw at least {SHORTEST} m")
+    aside = float(ground.wrap(ground.heading(line[0] - position) - heading))
+    begin = [position]
+    if abs(aside) > ASIDE or speed > 0.3:
+        reach = TURN if abs(aside) > ASIDE else 0.3
+        ahead = position + reach * ground.direction(np.array(heading))
+        if np.hypot(*(line[0] - ahead)) > SPACING:
+            begin.append(ahead)
+    return np.concatenate((np.array(begin), line))
+
+
+class Run:
+    """A point that runs along a line, and waits for who follows it (KS07: a curve becomes a point stream).
+
+    Parameters
+    ----------
+    points
+        Ground points, joined by straight lines, metres.
+    """
+
+    def __init__(self, points: Float[Array, "points 2"]) -> None:
+        steps = np.linalg.norm(np.diff(points, axis=0), axis=-1)
+        keep = np.concatenate(([True], steps > 1e-9))
+        self.points = points[keep]
+        self._along = np.concatenate(([0.0], np.cumsum(steps[keep[1:]])))
+        self.length = float(self._along[-1])
+        self.place = 0.0
+
+    def at(self, place: float) -> Float[Array, "2"]:
+        """The point of the line so far along it, metres."""
+        return np.array([np.interp(place, self._along, self.points[:, axis]) for axis in (0, 1)])
+
+    def advance(self, position: Float[Array, "2"], speed: float, lag: float, dt: float) -> Float[Array, "2"]:
+        """Run on for a while unless the walker is too far behind; where the point is then."""
+        point = self.at(self.place)
+        if np.hypot(*(point - position)) < speed * lag + AHEAD:
+            self.place = min(self.length, self.place + speed * dt)
+        return self.at(self.place)
+
+    def see(self, pose: Pose) -> bool:
+        """Whether the point is at the end, and the walker stands beside it."""
+        at_rest = pose.motion == "stand" and float(np.hypot(*pose.vehicle.velocity)) < 0.02
+        return self.place >= self.length and at_rest
