@@ -20,7 +20,7 @@ Host = Annotated[
     str | None,
     typer.Option(
         metavar="NAME",
-        help="Listen there instead of on this machine only, such as 0.0.0.0; others then need the token that is printed.",
+        help="Listen there instead of on this machine only, as 0.0.0.0; others then need the token that is printed.",
         show_default=False,
     ),
 ]

@@ -71,7 +71,7 @@ def make_app(hall: Hall, rules: Rules) -> Starlette:
             kept = await guest.uploads.save(request.query_params.get("name", ""), request.stream())
         except UploadRefusedError as error:
             return JSONResponse({"error": str(error)}, error.status, headers={"connection": "close"})
-        return JSONResponse({"file": kept, "files": guest.uploads.files, "bytes": guest.uploads.bytes})
+        return JSONResponse({"file": kept, "files": guest.uploads.files, "bytes": guest.uploads.size})
 
     async def give_file(request: Request) -> Response:
         found = hall.find(request.path_params["word"])

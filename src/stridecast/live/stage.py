@@ -6,31 +6,30 @@ import logging
 import queue
 import threading
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
 
 from stridecast import __version__
 from stridecast.crowd.rules import RULES
 from stridecast.errors import InputError
+from stridecast.formats.bvh import write_bvh
+from stridecast.formats.scenes import parse_scene, scene_of, scene_text, scene_values
+from stridecast.formats.store import load_database, save_database
+from stridecast.live import messages as say
+from stridecast.live.browsing import Browsing
+from stridecast.live.building import Building
+from stridecast.live.exporting import write_motions, write_walk, write_ways
+from stridecast.live.hall import Guest, Hall
 from stridecast.live.layout import CLAMPED
-from stridecast.live.messages import (
-    PROTOCOL,
-    ErrorMessage,
-    Health,
-    ModeMessage,
-    Part,
-    PlaceMessage,
-    SettingsMessage,
-    Welcome,
-    WishMessage,
-)
 from stridecast.live.outbox import Outbox
 from stridecast.live.pacing import Pacer
-from stridecast.live.telling import database_part, skeleton_part
+from stridecast.live.scene_play import Gone, ScenePlay
+from stridecast.live.staging import place_in
+from stridecast.live.telling import database_part, database_state, skeleton_part
 from stridecast.live.walking import Walking
 from stridecast.model.database import MotionDatabase
-
-if TYPE_CHECKING:
-    from stridecast.live.hall import Hall
 
 log = logging.getLogger("stridecast")
 
@@ -38,7 +37,16 @@ WAITING = 1000
 """So many messages wait at most."""
 
 IDLE = 0.25
-"""Where nothing plays, messages are looked for at least so often, seconds."""
+"""Messages are looked for at least so often, seconds."""
+
+Code = Literal["message", "wish", "scene", "database", "build", "cancelled", "export", "rate", "busy", "internal"]
+
+
+@dataclass(frozen=True)
+class _BuildEnded:
+    """A build has ended, with nothing or with what was wrong."""
+
+    wrong: str | None
 
 
 class Stage(threading.Thread):
@@ -50,20 +58,24 @@ class Stage(threading.Thread):
         What is shared.
     outbox
         What is told and shown goes here.
-    name
-        Of the session.
+    word
+        By which the hall knows the session.
     """
 
-    def __init__(self, hall: Hall, outbox: Outbox, name: str) -> None:
-        super().__init__(name=f"stage {name[:8]}", daemon=True)
-        self.hall, self.outbox, self.session = hall, outbox, name
-        self._inbox: queue.Queue[Part | None] = queue.Queue(WAITING)
+    def __init__(self, hall: Hall, outbox: Outbox, word: str) -> None:
+        super().__init__(name=f"stage {word[:8]}", daemon=True)
+        self.hall, self.outbox, self.word = hall, outbox, word
+        self.guest: Guest = hall.guests[word]
+        self.mode: say.Mode = "walk"
+        self._inbox: queue.Queue[object] = queue.Queue(WAITING)
         self._stopped = threading.Event()
-        self.mode = "walk"
-        self.database: MotionDatabase = hall.database
         self._times: list[float] = []
+        self._building: Building | None = None
+        self._build_request = 0
+        self._built: MotionDatabase | None = None
+        self._exporting: threading.Thread | None = None
 
-    def put(self, message: Part) -> bool:
+    def put(self, message: object) -> bool:
         """Hand over a message; False where too many wait."""
         try:
             self._inbox.put_nowait(message)
@@ -74,21 +86,23 @@ class Stage(threading.Thread):
     def stop(self) -> None:
         """End, as soon as what is being done is done."""
         self._stopped.set()
-        with_room = self._inbox.qsize() < WAITING
-        if with_room:
-            self._inbox.put_nowait(None)
+        if self._building is not None:
+            self._building.give_up()
+        self.put(None)
 
     def run(self) -> None:
         """Play until stopped."""
-        self._use(self.database, self.hall.name, built=False)
-        self._pacer = Pacer(self.database.frame_rate)
-        self._pacer.start(time.monotonic())
+        self._use(self.hall.database, self.hall.name, built=False)
         told = time.monotonic()
         while not self._stopped.is_set():
-            for message in self._come(self._wait()):
+            for message in self._come(min(self._pacer.wait(time.monotonic()), IDLE)):
                 self._take(message)
             now = time.monotonic()
-            for _ in range(self._pacer.due(now)):
+            due = self._pacer.due(now)
+            if due > 1 and self.mode != "walk":  # a crowd that is too slow for the clock goes on more slowly
+                self._pacer.late += due - 1
+                due = 1
+            for _ in range(due):
                 self._play()
             if now - told >= 1.0:
                 told = now
@@ -96,13 +110,24 @@ class Stage(threading.Thread):
 
     def _use(self, database: MotionDatabase, name: str, *, built: bool) -> None:
         """Begin anew with a database."""
-        self.database = database
-        self.walking = Walking(database, self.outbox.tell)
-        self.outbox.tell(
-            Welcome(
-                protocol=PROTOCOL,
+        tell = self.outbox.tell
+        self.database, self.name = database, name
+        self.walking = Walking(database, tell)
+        self.scene = ScenePlay(
+            database,
+            tell,
+            room=self.hall.limits.timeline_bytes,
+            threads=self.hall.threads,
+            gone=self._stopped.is_set,
+        )
+        self.browsing = Browsing(database, tell)
+        self._pacer = Pacer(database.frame_rate)
+        self._pacer.start(time.monotonic())
+        tell(
+            say.Welcome(
+                protocol=say.PROTOCOL,
                 version=__version__,
-                session=self.session,
+                session=self.word,
                 database=database_part(database, name, built),
                 skeleton=skeleton_part(database.skeleton),
                 settings=self.walking.settings,
@@ -114,12 +139,9 @@ class Stage(threading.Thread):
             )
         )
 
-    def _wait(self) -> float:
-        return min(self._pacer.wait(time.monotonic()), IDLE)
-
-    def _come(self, seconds: float) -> list[Part]:
+    def _come(self, seconds: float) -> list[object]:
         """Messages that have come, waiting for the first of them for a while."""
-        found: list[Part | None] = []
+        found: list[object] = []
         try:
             found.append(self._inbox.get(timeout=seconds) if seconds > 0 else self._inbox.get_nowait())
             while True:
@@ -127,45 +149,257 @@ class Stage(threading.Thread):
         except queue.Empty:
             return [message for message in found if message is not None]
 
+    # what the client says
+
     def _take(self, message: Any) -> None:
         """Do what a message says; what goes wrong is told."""
-        code = "internal"
-        try:
-            match message:
-                case ModeMessage():
-                    self.mode = message.mode
-                case WishMessage() | SettingsMessage() | PlaceMessage():
-                    code = "wish"
-                    self.walking.take(message)
-        except InputError as error:
-            self._tell_error(code, str(error), message)
-        except Exception:
-            log.exception("in the session's stage")
-            what = "the server met something that it did not expect; its log says more. Please report this"
-            self._tell_error("internal", what, message)
+        code, act = self._meaning(message)
+        self._guarded(code, lambda: act(message), getattr(message, "request", 0))
 
-    def _tell_error(self, code: Any, what: str, message: Any) -> None:
-        self.outbox.tell(ErrorMessage(code=code, message=what, request=getattr(message, "request", 0)))
+    def _guarded(self, code: Code, act: Callable[[], object], request: int = 0) -> None:
+        try:
+            act()
+        except InputError as error:
+            place, what = place_in(str(error)) if code == "scene" else ("", str(error))
+            self.outbox.tell(say.ErrorMessage(code=code, message=what, place=place, request=request))
+        except Gone:
+            self._stopped.set()
+        except Exception:
+            log.exception("a session met something unexpected and goes on")
+            what = "the server met something that it did not expect; its log says more. Please report this"
+            self.outbox.tell(say.ErrorMessage(code="internal", message=what, request=request))
+
+    def _meaning(self, message: Any) -> tuple[Code, Callable[[Any], object]]:
+        """What a message calls for, and the code of what may go wrong with it."""
+        tell = self.outbox.tell
+        match message:
+            case say.WishMessage() | say.SettingsMessage() | say.PlaceMessage():
+                return "wish", self.walking.take
+            case say.ModeMessage():
+                return "message", self._change_mode
+            case say.ViewMessage():
+                return "scene", self.scene.look
+            case say.SceneMessage():
+                return "scene", lambda m: tell(self.scene.check(m))
+            case say.OpenSceneMessage():
+                return "scene", self._open_scene
+            case say.SaveSceneMessage():
+                return "scene", self._save_scene
+            case say.PlaybackMessage():
+                return self._player_code, self._player.control
+            case say.PaceMessage():
+                return self._player_code, self._change_pace
+            case say.ScrubMessage():
+                return self._player_code, lambda m: self._player.scrub(m.time)
+            case say.ExplainMessage():
+                return "scene", lambda m: self.scene.ask(m.person)
+            case say.DatabaseMessage():
+                return "database", lambda m: tell(database_state(self.database, self.name, m.request))
+            case say.ClipMessage():
+                return "database", lambda m: self._tell_clip(self.browsing.show(m))
+            case say.MineMessage():
+                return "database", lambda m: self._tell_clip(self.browsing.mine(m))
+            case say.BuildMessage():
+                return "build", self._build
+            case say.CancelMessage():
+                return "build", lambda _: self._cancel()
+            case say.ForgetFilesMessage():
+                return "build", lambda _: self._forget_files()
+            case say.UseMessage():
+                return "database", self._change_database
+            case say.ExportMessage():
+                return "export", self._export
+            case _BuildEnded():
+                return "build", self._end_build
+        raise AssertionError(f"nobody takes {type(message).__name__}")
+
+    @property
+    def _player(self) -> ScenePlay | Browsing:
+        return self.browsing if self.mode == "database" else self.scene
+
+    @property
+    def _player_code(self) -> Code:
+        return "database" if self.mode == "database" else "scene"
+
+    def _change_mode(self, message: say.ModeMessage) -> None:
+        self.mode = message.mode
+        if message.mode != "walk":
+            self._player.show_again()
+
+    def _change_pace(self, message: say.PaceMessage) -> None:
+        self._player.pace = message.factor
+        self._player.tell_player()
+
+    def _open_scene(self, message: say.OpenSceneMessage) -> None:
+        values = scene_values(parse_scene(message.text, "scene"))
+        self.outbox.tell(say.SceneOpened(request=message.request, scene=values))
+
+    def _save_scene(self, message: say.SaveSceneMessage) -> None:
+        self.outbox.tell(say.SceneSaved(request=message.request, text=scene_text(scene_of(message.scene))))
+
+    def _tell_clip(self, ready: say.ClipReady) -> None:
+        self.outbox.tell(ready)
+        self.browsing.tell_player()
+
+    # builds
+
+    def _build(self, message: say.BuildMessage) -> None:
+        if self._building is not None:
+            raise InputError("a database is being built already; wait for it, or cancel it")
+        uploads = self.guest.uploads
+        recordings = [path for path in uploads.paths if path.suffix != ".asf"]
+        if not recordings:
+            raise InputError("no recording has been uploaded yet; send BVH, or AMC with their ASF, first")
+        output = self.guest.folder / "built.safetensors"
+        self._build_request = message.request
+        self._building = Building(
+            uploads.folder,
+            recordings,
+            output,
+            {"mirror": message.mirror, "scale": message.scale, "input_rate": message.input_rate},
+            progress=self._tell_progress,
+            finished=lambda wrong: self._inbox.put(_BuildEnded(wrong)),
+        )
+
+    def _tell_progress(self, stage: Any, done: int, total: int) -> None:
+        self.outbox.tell(say.Progress(stage=stage, done=done, total=total))
+
+    def _end_build(self, ended: _BuildEnded) -> None:
+        building = self._building
+        if building is None:
+            return
+        self._building = None
+        if ended.wrong is not None:
+            what = ended.wrong
+            self.outbox.tell(say.ErrorMessage(code="build", message=what, request=self._build_request))
+            return
+        self._built = load_database(building.output)
+        takes = self._built.takes
+        self.outbox.tell(
+            say.Built(
+                request=self._build_request,
+                takes=sum(1 for take in takes if take.segments),
+                left_out=sum(1 for take in takes if not take.segments),
+                examples=len(self._built.examples.durations),
+                seconds=building.seconds,
+                motions=list(self._built.motions),
+            )
+        )
+
+    def _cancel(self) -> None:
+        if self._building is None:
+            raise InputError("nothing is being built")
+        self._building.give_up()
+        self._building = None
+        what = "the build was cancelled; the files are still there"
+        self.outbox.tell(say.ErrorMessage(code="cancelled", message=what, request=self._build_request))
+
+    def _forget_files(self) -> None:
+        if self._building is not None:
+            raise InputError("the files are being built from; cancel that first")
+        self.guest.uploads.forget()
+        self.outbox.tell(say.FilesState(files=[], bytes=0))
+
+    def _change_database(self, message: say.UseMessage) -> None:
+        if message.database == "given":
+            self._use(self.hall.database, self.hall.name, built=False)
+        elif self._built is None:
+            raise InputError("no database has been built yet; upload recordings and build one")
+        else:
+            self._use(self._built, "own recordings", built=True)
+
+    # files
+
+    def _export(self, message: say.ExportMessage) -> None:
+        """Make a file of what was played in the mode that is on, while everything else goes on."""
+        if self._exporting is not None and self._exporting.is_alive():
+            raise InputError("another file is being made; wait for it")
+        write: Callable[[Path], None]
+        if message.what == "database":
+            built = self._built
+            if built is None:
+                raise InputError("no database has been built yet; upload recordings and build one")
+            name, write = "own.safetensors", lambda path: save_database(built, path)
+        elif message.what == "glb":
+            raise InputError("this server cannot write GLB; choose BVH")
+        elif self.mode == "walk":
+            journey = self.walking.journey()
+            name, write = f"walk.{message.what}", lambda path: write_walk(path, journey, message.what)
+        elif self.mode == "database":
+            name, write = "clip.bvh", self._write_clip(message.what)
+        elif message.what == "csv":
+            frames = self.scene.timeline.frames()
+            name, write = "crowd.csv", lambda path: write_ways(path, frames)
+        else:
+            name, write = "crowd.zip", self._write_crowd()
+        self._exporting = threading.Thread(
+            target=lambda: self._guarded("export", lambda: self._make(name, write, message.request), message.request),
+            daemon=True,
+        )
+        self._exporting.start()
+
+    def _make(self, name: str, write: Callable[[Path], None], request: int) -> None:
+        """Make a file, in a thread of its own."""
+        downloads = self.guest.downloads
+        path = downloads.place(name)
+        write(path)
+        url = downloads.offer(path, name)
+        self.outbox.tell(say.ExportReady(request=request, url=url, name=name, bytes=path.stat().st_size))
+
+    def _write_clip(self, what: str) -> Callable[[Path], None]:
+        motion = self.browsing.motion
+        if motion is None:
+            raise InputError("choose a segment, or mine for one, before it is saved")
+        if what != "bvh":
+            raise InputError("a clip is saved as BVH")
+        return lambda path: write_bvh(path, motion)
+
+    def _write_crowd(self) -> Callable[[Path], None]:
+        crowd = self.scene.crowd
+        if crowd is None:
+            raise InputError(
+                "nobody is there yet: put people, a source of people, or a start with goals into the scene"
+            )
+        frames = self.scene.timeline.frames()
+
+        def progress(done: int, total: int) -> None:
+            if self._stopped.is_set():
+                raise Gone
+            if done % max(1, total // 20) == 0:
+                self._tell_progress("export", done, total)
+
+        return lambda path: write_motions(path, frames, crowd, progress)
+
+    # playing
 
     def _play(self) -> None:
+        """Make one frame."""
         began = time.perf_counter()
-        try:
-            if self.mode == "walk":
-                self.outbox.show(self.walking.step())
-        except InputError as error:
-            self._tell_error("wish", str(error), None)
+        period = self._pacer.period
+        code: Code = "wish" if self.mode == "walk" else self._player_code
+        self._guarded(code, lambda: self._show(period, lambda: time.perf_counter() - began < 0.8 * period))
         self._times.append(time.perf_counter() - began)
+
+    def _show(self, period: float, in_time: Callable[[], bool]) -> None:
+        if self.mode == "walk":
+            frame: bytes | None = self.walking.step()
+        elif self.mode == "scene":
+            frame = self.scene.step(period, in_time)
+        else:
+            frame = self.browsing.step(period)
+        if frame is not None:
+            self.outbox.show(frame)
 
     def _tell_health(self) -> None:
         times = self._times or [0.0]
+        self._times = []
         self.outbox.tell(
-            Health(
-                mode=self.mode,  # type: ignore[arg-type]
-                step_ms=1e3 * sum(times) / len(times),
-                worst_ms=1e3 * max(times),
+            say.Health(
+                mode=self.mode,
+                step_ms=round(1e3 * sum(times) / len(times), 3),
+                worst_ms=round(1e3 * max(times), 3),
                 late=self._pacer.late,
                 dropped=self.outbox.dropped,
                 sessions=len(self.hall.guests),
             )
         )
-        self._times = []

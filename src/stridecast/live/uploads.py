@@ -44,7 +44,7 @@ class Uploads:
         return sorted(self._sizes)
 
     @property
-    def bytes(self) -> int:
+    def size(self) -> int:
         """Size of all together."""
         return sum(self._sizes.values())
 
