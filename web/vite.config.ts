@@ -1,0 +1,23 @@
+import { defineConfig } from "vitest/config";
+
+// The bundle goes where the server looks for it, and where the wheel takes it from.
+export default defineConfig({
+  base: "./",
+  build: {
+    outDir: "../src/stridecast/live/static",
+    emptyOutDir: true,
+    target: "es2022",
+    modulePreload: { polyfill: false },
+    chunkSizeWarningLimit: 1000,
+    assetsInlineLimit: 0, // data: addresses would need a wider content security policy
+  },
+  server: {
+    proxy: {
+      "/ws": { target: "ws://127.0.0.1:8765", ws: true },
+      "/body.glb": "http://127.0.0.1:8765",
+      "/files": "http://127.0.0.1:8765",
+      "/download": "http://127.0.0.1:8765",
+    },
+  },
+  test: { include: ["tests/**/*.test.ts"], environment: "node" },
+});
