@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8, UInt16
+from jaxtyping import Float, Int, Integer, UInt8, UInt16
 
 from stridecast.errors import InputError
 from stridecast.live.layout import ALIGNMENT, ARRAYS, HEADER, LEVELS, WALK, WALK_ARRAYS, Column
@@ -40,10 +40,10 @@ class Figures:
         Places of the moving obstacles, ``(x, z)``, metres.
     """
 
-    ids: Int[Array, "figures"]
+    ids: Integer[Array, "figures"]
     places: Float[Array, "figures 3"]
     speeds: Float[Array, "figures"]
-    rules: Int[Array, "figures"]
+    rules: Integer[Array, "figures"]
     roots: Float[Array, "full 3"]
     rotations: UInt16[Array, "full joints 3"]
     planted: UInt8[Array, "full"]

@@ -124,6 +124,11 @@ class LiveServer:
         """End; from any thread."""
         self._server.should_exit = True
 
+    def close(self) -> None:
+        """Give up the place of a server that has not been run."""
+        self._socket.close()
+        self.hall.close()
+
     @contextlib.contextmanager
     def running(self) -> Any:
         """Serve in a thread for as long as the context lasts."""

@@ -42,9 +42,10 @@ def typescript() -> str:
     return _HEAD + "\n" + _constants() + "\n" + "\n".join(parts.values())
 
 
-def _schema(adapter: TypeAdapter[Any], mode: str) -> dict[str, Any]:
+def _schema(adapter: Any, mode: str) -> dict[str, Any]:
     chosen: JsonSchemaMode = "serialization" if mode == "serialization" else "validation"
-    return adapter.json_schema(mode=chosen)
+    schema: dict[str, Any] = adapter.json_schema(mode=chosen)
+    return schema
 
 
 def _constants() -> str:

@@ -51,6 +51,9 @@ SPEEDS = {STAND: 1.3, WALKING: 1.5, RUN: 3.2}
 LEAST_DRIVE = 0.4
 """Who is driven at all goes at least so fast, m/s; nobody starts to walk more slowly."""
 
+AT_REST, OFF = 0.05, 2.2
+"""Who is slower than this (m/s) stands, and sets off for a point that is so far away (metres) in any case."""
+
 HELD = 0.05
 """A stick that is bent less is at rest."""
 
@@ -154,9 +157,9 @@ class Walking:
         wish = message.wish
         way: Run | Guide | None = None
         if isinstance(wish, CurveWish):
-            way = Run(way_of(self._position, self._heading, self._speed, wish.points))
+            way = Run(way_of(self._position, self._heading, wish.points))
         elif isinstance(wish, PathWish):
-            way = self._guide(way_of(self._position, self._heading, self._speed, wish.points))
+            way = self._guide(way_of(self._position, self._heading, wish.points))
         self._give_up_way()
         self._wish, self._way = wish, way
         self.echo = message.at or self.echo
@@ -224,8 +227,9 @@ class Walking:
         if isinstance(wish, DriveWish) and np.hypot(*wish.direction) >= HELD:
             way = np.array(wish.direction)
             length = float(np.hypot(*way))
-            wished = max(min(length, 1.0) * self.settings.speed, LEAST_DRIVE)
-            return _Asked(point=here + way / length * wished * self.walker.gains.lag, motion=motion)
+            far = max(min(length, 1.0) * self.settings.speed, LEAST_DRIVE) * self.walker.gains.lag
+            far = OFF if self._speed < AT_REST else far
+            return _Asked(point=here + way / length * far, motion=motion)
         if isinstance(self._way, Run):
             point = self._way.advance(here, self.settings.speed, self.walker.gains.lag, 1.0 / self.rate)
             return _Asked(point=self._leashed(point), motion=motion, shown=point)
@@ -239,7 +243,7 @@ class Walking:
         """A point in the same direction that asks for no more than the wished speed."""
         away = point - self._position
         far, most = float(np.hypot(*away)), self.settings.speed * self.walker.gains.lag
-        return point if far <= most else self._position + away * (most / far)
+        return point if far <= most or self._speed < AT_REST else self._position + away * (most / far)
 
     def _force(self, wish: ForceWish) -> Float[Array, "2"]:
         """A force in the world that does not ask for more than the wished speed."""

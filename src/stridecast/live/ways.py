@@ -19,11 +19,8 @@ SPACING = 0.1
 JOINED = 0.3
 """A line that begins nearer to the walker than this begins at the walker, metres."""
 
-ASIDE = np.radians(60)
-"""A line that begins further aside than this is reached by a turn ahead of the walker, ..."""
-
-TURN = 0.7
-"""... which begins so far ahead, metres."""
+RADIUS = 0.5
+"""Of the turn by which a line is reached that does not begin straight ahead, metres."""
 
 AHEAD = 0.8
 """The point waits when it is further ahead than the walker is used to keep behind, and this, metres."""
@@ -33,14 +30,14 @@ SHORTEST = 0.3
 
 
 def way_of(
-    position: Float[Array, "2"], heading: float, speed: float, drawn: Sequence[tuple[float, float]]
+    position: Float[Array, "2"], heading: float, drawn: Sequence[tuple[float, float]]
 ) -> Float[Array, "points 2"]:
     """A drawn line from where the walker is.
 
     Parameters
     ----------
-    position, heading, speed
-        Of the walker, metres, radians and m/s.
+    position, heading
+        Of the walker, metres and radians.
     drawn
         Points as they were drawn, metres.
 
@@ -60,14 +57,26 @@ def way_of(
     length = float(np.linalg.norm(np.diff(np.concatenate((position[None], line)), axis=0), axis=-1).sum())
     if length < SHORTEST:
         raise PathError(f"the line is {length:.2f} m long from where the walker is; draw at least {SHORTEST} m")
-    aside = float(ground.wrap(ground.heading(line[0] - position) - heading))
-    begin = [position]
-    if abs(aside) > ASIDE or speed > 0.3:
-        reach = TURN if abs(aside) > ASIDE else 0.3
-        ahead = position + reach * ground.direction(np.array(heading))
-        if np.hypot(*(line[0] - ahead)) > SPACING:
-            begin.append(ahead)
-    return np.concatenate((np.array(begin), line))
+    arc = _arc(position, heading, line[0])
+    outside = np.hypot(*(line - arc[-1]).T) > SPACING
+    first = int(np.argmax(outside)) if outside.any() else len(line) - 1
+    return np.concatenate((arc, line[first:]))
+
+
+def _arc(position: Float[Array, "2"], heading: float, goal: Float[Array, "2"]) -> Float[Array, "points 2"]:
+    """From a place round to where a goal lies straight ahead, on a circle of ``RADIUS`` to its side."""
+    away = ground.turn(goal - position, np.array(-heading))  # left, forward
+    side = 1.0 if away[0] >= 0 else -1.0
+    x, z = side * float(away[0]) - RADIUS, float(away[1])  # from the centre of the circle
+    far = float(np.hypot(x, z))
+    # The tangent from the goal leaves the circle where radius and goal enclose this angle.
+    opens = np.arccos(RADIUS / far) if far > RADIUS else 0.0
+    angle = float(np.mod(np.arctan2(z, -x) - opens, 2 * np.pi))
+    if angle > np.radians(350) or angle < np.radians(3):
+        return position[None]
+    turned = np.linspace(0.0, angle, max(2, int(angle * RADIUS / SPACING) + 1))
+    local = np.stack((side * RADIUS * (1 - np.cos(turned)), RADIUS * np.sin(turned)), axis=-1)
+    return position + ground.turn(local, np.array(heading))
 
 
 class Run:
