@@ -10,8 +10,8 @@ interface Node {
 }
 
 const WIDTH = 268;
-const HEIGHT = 168;
-const CORNERS: Record<string, [number, number]> = { stand: [38, 128], walk: [134, 30], run: [230, 128] };
+const HEIGHT = 140;
+const CORNERS: Record<string, [number, number]> = { stand: [38, 106], walk: [134, 24], run: [230, 106] };
 
 export class GraphDrawing {
   readonly element: HTMLElement;
@@ -73,7 +73,7 @@ export class GraphDrawing {
       return { x, y, circle };
     });
     const words = svg("g", { class: "graph-words" });
-    const labels: Record<string, [number, number, string]> = { stand: [38, 158, "middle"], walk: [158, 20, "start"], run: [230, 158, "middle"] };
+    const labels: Record<string, [number, number, string]> = { stand: [38, 134, "middle"], walk: [160, 18, "start"], run: [230, 134, "middle"] };
     for (const [word, [x, y, anchor]] of Object.entries(labels)) {
       if (between.has(word)) words.appendChild(svg("text", { x, y, "text-anchor": anchor }, word));
     }

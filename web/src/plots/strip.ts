@@ -30,7 +30,7 @@ export class Strip {
     this.plot = new uPlot(
       {
         width: 256,
-        height: 74,
+        height: 62,
         padding: [4, 2, 0, 0],
         cursor: { show: false },
         legend: { show: false },
@@ -70,7 +70,7 @@ export class Strip {
     );
     new ResizeObserver(() => {
       const width = holder.clientWidth;
-      if (width > 0) this.plot.setSize({ width, height: 74 });
+      if (width > 0) this.plot.setSize({ width, height: 62 });
     }).observe(holder);
   }
 
