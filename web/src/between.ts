@@ -18,7 +18,12 @@ export class Between {
   /** A frame has come. Where time runs back or leaps there is nothing between. */
   push(frame: Frame, now: number): void {
     const last = this.newest;
-    const leap = last === null || last.kind !== frame.kind || last.joints !== frame.joints || frame.number < last.number || Math.abs(frame.time - last.time) > 0.7;
+    const leap =
+      last === null ||
+      last.kind !== frame.kind ||
+      last.joints !== frame.joints ||
+      frame.number < last.number ||
+      Math.abs(frame.time - last.time) > 0.7;
     this.before = leap ? null : last;
     if (!leap && last) this.spacing += (Math.min(0.2, (now - this.arrived) / 1000) - this.spacing) * 0.15;
     this.newest = frame;
@@ -35,7 +40,8 @@ export class Between {
   sample(now: number): number {
     const frame = this.newest;
     if (!frame) return 0;
-    const share = this.direct || !this.before ? 1 : Math.min(1, (now - this.arrived) / 1000 / Math.max(0.004, this.spacing));
+    const share =
+      this.direct || !this.before ? 1 : Math.min(1, (now - this.arrived) / 1000 / Math.max(0.004, this.spacing));
     if (this.places.length !== frame.places.length) this.places = new Float32Array(frame.places.length);
     if (this.roots.length !== frame.roots.length) this.roots = new Float32Array(frame.roots.length);
     if (this.rotations.length !== frame.rotations.length) this.rotations = new Float32Array(frame.rotations.length);
@@ -63,11 +69,19 @@ function mix(out: Float32Array, from: Float32Array, at: number, fromAt: number, 
 }
 
 /** Normalised linear interpolation: neighbours are frames, so the rotations are near each other. */
-function turnBetween(out: Float32Array, from: Float32Array, at: number, fromAt: number, joints: number, share: number): void {
+function turnBetween(
+  out: Float32Array,
+  from: Float32Array,
+  at: number,
+  fromAt: number,
+  joints: number,
+  share: number,
+): void {
   for (let j = 0; j < joints; j++) {
     const o = at + 4 * j;
     const f = fromAt + 4 * j;
-    const dot = out[o]! * from[f]! + out[o + 1]! * from[f + 1]! + out[o + 2]! * from[f + 2]! + out[o + 3]! * from[f + 3]!;
+    const dot =
+      out[o]! * from[f]! + out[o + 1]! * from[f + 1]! + out[o + 2]! * from[f + 2]! + out[o + 3]! * from[f + 3]!;
     const keep = dot < 0 ? share - 1 : 1 - share;
     let length = 0;
     for (let c = 0; c < 4; c++) {

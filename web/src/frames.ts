@@ -1,6 +1,17 @@
 /** Binary frames of the server, decoded into typed arrays (docs/protocol.md, "Binary frames"). */
 
-import { ALIGNMENT, ARRAYS, HEADER, HEADER_BYTES, LEVELS, PLAYING, REPLAYED, STEERING, WALK, WALK_ARRAYS } from "./protocol";
+import {
+  ALIGNMENT,
+  ARRAYS,
+  HEADER,
+  HEADER_BYTES,
+  LEVELS,
+  PLAYING,
+  REPLAYED,
+  STEERING,
+  WALK,
+  WALK_ARRAYS,
+} from "./protocol";
 
 type Steering = Record<(typeof STEERING)[number], number>;
 type Playing = Record<(typeof PLAYING)[number], number>;
@@ -34,7 +45,9 @@ export interface Frame {
 /** Thrown when bytes are no frame. */
 export class FrameError extends Error {}
 
-const QUOTIENTS = Float32Array.from({ length: 2 * LEVELS + 2 }, (_, v) => Math.tan(((v - LEVELS) * Math.PI) / (4 * LEVELS)));
+const QUOTIENTS = Float32Array.from({ length: 2 * LEVELS + 2 }, (_, v) =>
+  Math.tan(((v - LEVELS) * Math.PI) / (4 * LEVELS)),
+);
 
 const SIZES: Record<string, number> = { u1: 1, u2: 2, u4: 4, f4: 4 };
 

@@ -48,7 +48,15 @@ function begin(): void {
   }
   const where = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`;
   const connection = new Connection(where);
-  const page: Page = { stage, connection, between: new Between(), messages, people: null, welcome: null, latency: null };
+  const page: Page = {
+    stage,
+    connection,
+    between: new Between(),
+    messages,
+    people: null,
+    welcome: null,
+    latency: null,
+  };
   page.between.direct = !picture.smooth;
 
   const scene = new SceneMode(page, picture);
@@ -83,13 +91,16 @@ function begin(): void {
     if (!entered) {
       entered = true;
       mode.enter();
-    } else if (again && welcome.session !== lastSession) messages.say("The connection is back, and everything is as you left it.", "good");
+    } else if (again && welcome.session !== lastSession)
+      messages.say("The connection is back, and everything is as you left it.", "good");
     lastSession = welcome.session;
   });
   let lastSession = "";
   connection.onLink((link) => {
-    if (link === "waiting" && page.welcome) messages.say(connection.why || "The connection to the server broke. The page tries again by itself.", "error");
-    if (link === "waiting" && !page.welcome) shell.ready(connection.why || "No server answers. Start one with: stridecast demo");
+    if (link === "waiting" && page.welcome)
+      messages.say(connection.why || "The connection to the server broke. The page tries again by itself.", "error");
+    if (link === "waiting" && !page.welcome)
+      shell.ready(connection.why || "No server answers. Start one with: stridecast demo");
     if (link === "refused") messages.error(connection.why);
   });
   connection.on("error", (error) => {
@@ -116,7 +127,12 @@ function begin(): void {
     const arrows = event.key.startsWith("Arrow") || event.key === "PageUp" || event.key === "PageDown";
     if (arrows && takesArrows(event.target)) return;
     // space and enter belong to the button that has the focus
-    if ((event.key === " " || event.key === "Enter") && event.target instanceof HTMLElement && event.target.closest("button, a, summary, input, [role=row]")) return;
+    if (
+      (event.key === " " || event.key === "Enter") &&
+      event.target instanceof HTMLElement &&
+      event.target.closest("button, a, summary, input, [role=row]")
+    )
+      return;
     if (mode.key(event) || pageKey(event)) event.preventDefault();
   });
   addEventListener("keyup", (event) => mode.keyUp?.(event));
@@ -132,6 +148,8 @@ function begin(): void {
     return true;
   }
 
+  // for scripts that use the page as a hand would: where a place of the world is seen
+  Object.assign(window, { stridecast: { seenAt: (x: number, y: number, z: number) => stage.seenAt(x, y, z) } });
   stage.run();
   connection.open();
 }
@@ -149,7 +167,9 @@ function dress(page: Page, welcome: NonNullable<Page["welcome"]>): void {
   if (!welcome.glb) return;
   Skin.load(`body.glb?session=${encodeURIComponent(welcome.session)}`, people.body, MOST_SKINNED)
     .then((skin) => people.wear(skin))
-    .catch((error: unknown) => page.messages.say(`The mannequin could not be loaded (${String(error)}); simpler figures are shown.`));
+    .catch((error: unknown) =>
+      page.messages.say(`The mannequin could not be loaded (${String(error)}); simpler figures are shown.`),
+    );
 }
 
 begin();

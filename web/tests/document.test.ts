@@ -68,7 +68,11 @@ describe("a scene", () => {
   });
 
   it("removes several things of several kinds at once", () => {
-    const refs: doc.Ref[] = [{ kind: "people", index: 0 }, { kind: "people", index: 2 }, { kind: "roads", index: 1 }];
+    const refs: doc.Ref[] = [
+      { kind: "people", index: 0 },
+      { kind: "people", index: 2 },
+      { kind: "roads", index: 1 },
+    ];
     const left = doc.remove(scene, refs);
     expect(doc.listOf(left, "people").map((person) => person.name)).toEqual(["Ben", "Dan", "Eve", "Finn", "Gil"]);
     expect(doc.listOf(left, "roads")).toHaveLength(1);
@@ -77,7 +81,11 @@ describe("a scene", () => {
   it("merges how a person goes", () => {
     const ref = { kind: "people", index: 0 } as const;
     const next = doc.behave(doc.behave(scene, ref, { weight: 90 }), ref, { status: "run" });
-    expect((doc.partOf(next, ref) as { behavior: object }).behavior).toEqual({ velocity: 1.4, weight: 90, status: "run" });
+    expect((doc.partOf(next, ref) as { behavior: object }).behavior).toEqual({
+      velocity: 1.4,
+      weight: 90,
+      status: "run",
+    });
   });
 });
 

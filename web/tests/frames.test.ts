@@ -5,7 +5,9 @@ import { HEADER_BYTES, LEVELS } from "../src/protocol";
 /** The packing of docs/protocol.md, written down once more. */
 function pack(q: readonly number[]): number[] {
   const greatest = q.reduce((best, x, i) => (Math.abs(x) > Math.abs(q[best]!) ? i : best), 0);
-  const rest = q.filter((_, i) => i !== greatest).map((x) => Math.round((Math.atan(x / q[greatest]!) * 4 * LEVELS) / Math.PI) + LEVELS);
+  const rest = q
+    .filter((_, i) => i !== greatest)
+    .map((x) => Math.round((Math.atan(x / q[greatest]!) * 4 * LEVELS) / Math.PI) + LEVELS);
   return [rest[0]! | ((greatest >> 1) << 15), rest[1]! | ((greatest & 1) << 15), rest[2]!];
 }
 
@@ -23,7 +25,10 @@ describe("rotations", () => {
       const back = unpack(Uint16Array.from(pack(q)));
       const dot = Math.abs(q.reduce((sum, x, k) => sum + x * back[k]!, 0));
       expect(2 * Math.acos(Math.min(1, dot))).toBeLessThan(2e-3); // float32 of an angle near 0
-      const apart = Math.min(Math.hypot(...q.map((x, k) => x - back[k]!)), Math.hypot(...q.map((x, k) => x + back[k]!)));
+      const apart = Math.min(
+        Math.hypot(...q.map((x, k) => x - back[k]!)),
+        Math.hypot(...q.map((x, k) => x + back[k]!)),
+      );
       expect(2 * apart).toBeLessThan(1e-4);
     }
   });
@@ -59,7 +64,9 @@ describe("frames", () => {
     view.setUint8(at + 8, 3);
     const frame = decode(buffer);
     expect(frame).toMatchObject({ kind: 2, replayed: true, number: 77, time: 2.5, count: 1, full: 1, steering: null });
-    expect([...frame.ids, ...frame.places, ...frame.speeds, ...frame.rules, ...frame.roots]).toEqual([9, 1, 2, 3, 1.5, 4, 4, 5, 6]);
+    expect([...frame.ids, ...frame.places, ...frame.speeds, ...frame.rules, ...frame.roots]).toEqual([
+      9, 1, 2, 3, 1.5, 4, 4, 5, 6,
+    ]);
     expect([...frame.rotations]).toEqual([1, 0, 0, 0]);
     expect([...frame.planted]).toEqual([3]);
   });

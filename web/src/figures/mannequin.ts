@@ -38,13 +38,42 @@ export function mannequinOf(body: Body): Piece[] {
 
   // trunk
   const hips = role("hips") ?? 0;
-  put(hips, limb(v(0, -0.075, 0), v(0, 0.085, -0.005), size([[0, 0.1, 0.085], [0.35, 0.152, 0.108], [0.75, 0.142, 0.1], [1, 0.118, 0.085]]), SIDE, SKIN, 28));
+  put(
+    hips,
+    limb(
+      v(0, -0.075, 0),
+      v(0, 0.085, -0.005),
+      size([
+        [0, 0.1, 0.085],
+        [0.35, 0.152, 0.108],
+        [0.75, 0.142, 0.1],
+        [1, 0.118, 0.085],
+      ]),
+      SIDE,
+      SKIN,
+      28,
+    ),
+  );
   const trunk = ["spine", "spine1", "chest"].map(role).filter((joint): joint is number => joint !== undefined);
   for (const [i, joint] of trunk.entries()) {
     const next = trunk[i + 1];
     if (next === undefined) continue;
     const w = 0.12 + 0.014 * i;
-    put(joint, limb(v(0, -0.012, 0), offset(next).add(v(0, 0.012, 0)), size([[0, w, 0.088], [0.5, w + 0.005, 0.093], [1, w + 0.012, 0.096]]), SIDE, SKIN, 28));
+    put(
+      joint,
+      limb(
+        v(0, -0.012, 0),
+        offset(next).add(v(0, 0.012, 0)),
+        size([
+          [0, w, 0.088],
+          [0.5, w + 0.005, 0.093],
+          [1, w + 0.012, 0.096],
+        ]),
+        SIDE,
+        SKIN,
+        28,
+      ),
+    );
   }
   const neck = role("neck");
   const chest = role("chest") ?? trunk[trunk.length - 1] ?? hips;
@@ -69,7 +98,21 @@ export function mannequinOf(body: Body): Piece[] {
   const head = role("head");
   if (neck !== undefined) {
     const top = head === undefined ? v(0, 0.1, 0.01) : offset(head);
-    put(neck, limb(v(0, -0.035, 0), top, size([[0, 0.056, 0.056], [0.5, 0.049, 0.05], [1, 0.05, 0.052]]), SIDE, SEAM, 18));
+    put(
+      neck,
+      limb(
+        v(0, -0.035, 0),
+        top,
+        size([
+          [0, 0.056, 0.056],
+          [0.5, 0.049, 0.05],
+          [1, 0.05, 0.052],
+        ]),
+        SIDE,
+        SEAM,
+        18,
+      ),
+    );
   }
   if (head !== undefined) {
     put(
@@ -92,7 +135,18 @@ export function mannequinOf(body: Body): Piece[] {
     if (thigh) {
       put(
         at("thigh"),
-        limb(v(0, 0, 0), thigh, size([[0, 0.082, 0.084], [0.25, 0.084, 0.09], [0.7, 0.062, 0.068], [1, 0.051, 0.053]]), SIDE, SKIN),
+        limb(
+          v(0, 0, 0),
+          thigh,
+          size([
+            [0, 0.082, 0.084],
+            [0.25, 0.084, 0.09],
+            [0.7, 0.062, 0.068],
+            [1, 0.051, 0.053],
+          ]),
+          SIDE,
+          SKIN,
+        ),
       );
     }
     const shin = between("shin", "foot");
@@ -100,7 +154,18 @@ export function mannequinOf(body: Body): Piece[] {
       put(
         at("shin"),
         egg(new Vector3(), v(0.054, 0.056, 0.056), SEAM),
-        limb(v(0, -0.012, 0), shin, size([[0, 0.048, 0.05], [0.27, 0.052, 0.061, 0, 0.009], [0.65, 0.039, 0.043, 0, 0.006], [1, 0.031, 0.036]]), SIDE, SKIN),
+        limb(
+          v(0, -0.012, 0),
+          shin,
+          size([
+            [0, 0.048, 0.05],
+            [0.27, 0.052, 0.061, 0, 0.009],
+            [0.65, 0.039, 0.043, 0, 0.006],
+            [1, 0.031, 0.036],
+          ]),
+          SIDE,
+          SKIN,
+        ),
       );
     }
     const foot = between("foot", "toe");
@@ -111,7 +176,18 @@ export function mannequinOf(body: Body): Piece[] {
       put(
         at("foot"),
         egg(new Vector3(), v(0.037, 0.038, 0.038), SEAM),
-        limb(heel, ball, size([[0, 0.033, 0.035], [0.3, 0.036, 0.043, 0, -0.008], [0.62, 0.042, 0.037, 0, -0.007], [1, 0.046, 0.025]]), SIDE, SKIN),
+        limb(
+          heel,
+          ball,
+          size([
+            [0, 0.033, 0.035],
+            [0.3, 0.036, 0.043, 0, -0.008],
+            [0.62, 0.042, 0.037, 0, -0.007],
+            [1, 0.046, 0.025],
+          ]),
+          SIDE,
+          SKIN,
+        ),
       );
       const toe = at("toe")!;
       const tip = end(toe) ?? v(0, 0, 0.07);
@@ -122,7 +198,11 @@ export function mannequinOf(body: Body): Piece[] {
         limb(
           new Vector3(0, toeFloor + 0.025 * s, 0),
           new Vector3(0, toeFloor + 0.018 * s, length),
-          size([[0, 0.046, 0.024], [0.6, 0.044, 0.02], [1, 0.032, 0.016]]),
+          size([
+            [0, 0.046, 0.024],
+            [0.6, 0.044, 0.02],
+            [1, 0.032, 0.016],
+          ]),
           SIDE,
           SKIN,
         ),
@@ -130,17 +210,53 @@ export function mannequinOf(body: Body): Piece[] {
     }
     // arm
     const clavicle = between("shoulder", "upper_arm");
-    if (clavicle) put(at("shoulder"), limb(clavicle.clone().multiplyScalar(0.1), clavicle, size([[0, 0.05, 0.052], [1, 0.05, 0.05]]), BACK, SKIN));
+    if (clavicle)
+      put(
+        at("shoulder"),
+        limb(
+          clavicle.clone().multiplyScalar(0.1),
+          clavicle,
+          size([
+            [0, 0.05, 0.052],
+            [1, 0.05, 0.05],
+          ]),
+          BACK,
+          SKIN,
+        ),
+      );
     const upper = between("upper_arm", "forearm");
     if (upper) {
-      put(at("upper_arm"), limb(upper.clone().multiplyScalar(0.02), upper, size([[0, 0.05, 0.054], [0.3, 0.047, 0.05], [1, 0.037, 0.039]]), BACK, SKIN));
+      put(
+        at("upper_arm"),
+        limb(
+          upper.clone().multiplyScalar(0.02),
+          upper,
+          size([
+            [0, 0.05, 0.054],
+            [0.3, 0.047, 0.05],
+            [1, 0.037, 0.039],
+          ]),
+          BACK,
+          SKIN,
+        ),
+      );
     }
     const fore = between("forearm", "hand");
     if (fore) {
       put(
         at("forearm"),
         egg(new Vector3(), v(0.04, 0.04, 0.04), SEAM),
-        limb(new Vector3(), fore, size([[0, 0.037, 0.037], [0.28, 0.04, 0.039], [1, 0.025, 0.022]]), BACK, SKIN),
+        limb(
+          new Vector3(),
+          fore,
+          size([
+            [0, 0.037, 0.037],
+            [0.28, 0.04, 0.039],
+            [1, 0.025, 0.022],
+          ]),
+          BACK,
+          SKIN,
+        ),
       );
       const along = fore.clone().normalize();
       const turn = new Quaternion().setFromUnitVectors(new Vector3(1, 0, 0).multiplyScalar(sign), along);
@@ -152,7 +268,12 @@ export function mannequinOf(body: Body): Piece[] {
         egg(new Vector3(), v(0.026, 0.024, 0.026), SEAM, turn),
         egg(palm, v(0.056, 0.019, 0.041), SKIN, turn),
         egg(fingers, v(0.052, 0.014, 0.034), SKIN, turn),
-        egg(thumb, v(0.036, 0.013, 0.015), SKIN, turn.clone().multiply(new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), -sign * 0.7))),
+        egg(
+          thumb,
+          v(0.036, 0.013, 0.015),
+          SKIN,
+          turn.clone().multiply(new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), -sign * 0.7)),
+        ),
       );
     }
   }

@@ -77,7 +77,11 @@ export class People {
     this.group.add(skin.group);
   }
 
-  private instanced(geometry: CapsuleGeometry | ReturnType<typeof merged>, material: Material, most: number): InstancedMesh {
+  private instanced(
+    geometry: CapsuleGeometry | ReturnType<typeof merged>,
+    material: Material,
+    most: number,
+  ): InstancedMesh {
     const mesh = new InstancedMesh(geometry, material, most);
     mesh.castShadow = true;
     this.group.add(this.ready(mesh));
@@ -162,7 +166,9 @@ function capsule(height: number): ReturnType<typeof merged> {
 
 /** Somebody far away: eight sides. */
 function plain(height: number): ReturnType<typeof merged> {
-  const trunk = new CylinderGeometry(0.19, 0.13, height * 0.84, 8, 1).scale(1.05, 1, 0.75).translate(0, height * 0.42, 0);
+  const trunk = new CylinderGeometry(0.19, 0.13, height * 0.84, 8, 1)
+    .scale(1.05, 1, 0.75)
+    .translate(0, height * 0.42, 0);
   const head = new SphereGeometry(height * 0.07, 6, 5).translate(0, height * 0.92, 0);
   for (const part of [trunk, head]) part.deleteAttribute("uv");
   return white(merged([trunk, head]));

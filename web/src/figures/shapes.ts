@@ -39,7 +39,11 @@ export function limb(
       const angle = (k / round) * Math.PI * 2;
       const x = Math.cos(angle) * w + sw;
       const z = Math.sin(angle) * d + sd;
-      const point = a.clone().addScaledVector(axis, along * length).addScaledVector(wide, x).addScaledVector(deep, z);
+      const point = a
+        .clone()
+        .addScaledVector(axis, along * length)
+        .addScaledVector(wide, x)
+        .addScaledVector(deep, z);
       positions.push(point.x, point.y, point.z);
     }
   }
@@ -90,7 +94,13 @@ function smooth(sections: readonly Section[]): Section[] {
 }
 
 /** An ellipsoid. */
-export function egg(centre: Vector3, radii: Vector3, colour: Color, turn = new Quaternion(), round = 18): BufferGeometry {
+export function egg(
+  centre: Vector3,
+  radii: Vector3,
+  colour: Color,
+  turn = new Quaternion(),
+  round = 18,
+): BufferGeometry {
   const geometry = new SphereGeometry(1, round, Math.ceil(round * 0.75));
   geometry.applyMatrix4(new Matrix4().compose(centre, turn, radii));
   geometry.deleteAttribute("uv");

@@ -1,6 +1,16 @@
 /** Skinned figures: the mannequin that the server makes of the skeleton, cloned for those who are nearest. */
 
-import { type Bone, type Color, Group, type Material, Mesh, type MeshStandardMaterial, type Object3D, PropertyBinding, SkinnedMesh } from "three";
+import {
+  type Bone,
+  type Color,
+  Group,
+  type Material,
+  Mesh,
+  type MeshStandardMaterial,
+  type Object3D,
+  PropertyBinding,
+  SkinnedMesh,
+} from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { clone } from "three/addons/utils/SkeletonUtils.js";
 import type { Body } from "./body";
@@ -35,7 +45,14 @@ export class Skin {
   }
 
   /** Show one more figure; `false` when there are no more. */
-  add(roots: Float32Array, rootAt: number, rotations: Float32Array, rotationAt: number, scale: number, colour: Color): boolean {
+  add(
+    roots: Float32Array,
+    rootAt: number,
+    rotations: Float32Array,
+    rotationAt: number,
+    scale: number,
+    colour: Color,
+  ): boolean {
     if (this.used >= this.most) return false;
     const wearer = this.wearers[this.used] ?? this.dress();
     this.used++;

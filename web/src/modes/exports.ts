@@ -8,7 +8,10 @@ import type { Page } from "./mode";
 type What = "bvh" | "glb" | "csv" | "database";
 
 /** A row of buttons, one a format. */
-export function exportButtons(page: Page, formats: readonly (readonly [what: What, label: string, title: string])[]): HTMLElement {
+export function exportButtons(
+  page: Page,
+  formats: readonly (readonly [what: What, label: string, title: string])[],
+): HTMLElement {
   return el(
     "div",
     { class: "button-row", role: "group", "aria-label": "Download" },

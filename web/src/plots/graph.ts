@@ -15,7 +15,12 @@ const CORNERS: Record<string, [number, number]> = { stand: [38, 106], walk: [134
 
 export class GraphDrawing {
   readonly element: HTMLElement;
-  private readonly picture = svg("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, class: "graph", role: "img", "aria-label": "Transition graph" });
+  private readonly picture = svg("svg", {
+    viewBox: `0 0 ${WIDTH} ${HEIGHT}`,
+    class: "graph",
+    role: "img",
+    "aria-label": "Transition graph",
+  });
   private readonly caption = el("p", { class: "graph-caption" });
   private nodes: Node[] = [];
   private edges = new Map<string, SVGElement>();
@@ -68,12 +73,20 @@ export class GraphDrawing {
     const dots = svg("g", { class: "graph-nodes" });
     this.nodes = places.map(([x, y], i) => {
       const steady = !database.groups[i]!.motion.includes("-");
-      const circle = svg("circle", { cx: x, cy: y, r: steady ? 5 : 3.2, class: steady ? "steady" : "" }, svg("title", {}, this.names[i]!));
+      const circle = svg(
+        "circle",
+        { cx: x, cy: y, r: steady ? 5 : 3.2, class: steady ? "steady" : "" },
+        svg("title", {}, this.names[i]!),
+      );
       dots.appendChild(circle);
       return { x, y, circle };
     });
     const words = svg("g", { class: "graph-words" });
-    const labels: Record<string, [number, number, string]> = { stand: [38, 134, "middle"], walk: [160, 18, "start"], run: [230, 134, "middle"] };
+    const labels: Record<string, [number, number, string]> = {
+      stand: [38, 134, "middle"],
+      walk: [160, 18, "start"],
+      run: [230, 134, "middle"],
+    };
     for (const [word, [x, y, anchor]] of Object.entries(labels)) {
       if (between.has(word)) words.appendChild(svg("text", { x, y, "text-anchor": anchor }, word));
     }

@@ -25,7 +25,12 @@ export class Strip {
     private readonly range: [number, number],
   ) {
     const holder = el("div", { class: "strip-plot" });
-    this.element = el("figure", { class: "strip", "aria-label": `${title} of the last ${SECONDS} seconds, between its bounds` }, el("figcaption", {}, title, el("span", { class: "unit" }, unit)), holder);
+    this.element = el(
+      "figure",
+      { class: "strip", "aria-label": `${title} of the last ${SECONDS} seconds, between its bounds` },
+      el("figcaption", {}, title, el("span", { class: "unit" }, unit)),
+      holder,
+    );
     const font = "10.5px system-ui, sans-serif";
     this.plot = new uPlot(
       {
@@ -49,7 +54,10 @@ export class Strip {
               const [low, high] = [u.scales.y!.min ?? 0, u.scales.y!.max ?? 1];
               const step = niceStep((high - low) / 3);
               const first = Math.ceil(low / step) * step;
-              return Array.from({ length: Math.floor((high - first) / step + 1e-6) + 1 }, (_, i) => +(first + i * step).toFixed(6));
+              return Array.from(
+                { length: Math.floor((high - first) / step + 1e-6) + 1 },
+                (_, i) => +(first + i * step).toFixed(6),
+              );
             },
             values: (_, splits) => splits.map((v) => String(+v.toFixed(2))),
             grid: { stroke: "rgba(20,30,50,.07)", width: 1 },
@@ -82,7 +90,8 @@ export class Strip {
     this.least.push(least);
     this.most.push(most);
     this.hits.push(hit ? value : null);
-    if (this.times.length > CAPACITY) for (const list of [this.times, this.values, this.least, this.most, this.hits]) list.shift();
+    if (this.times.length > CAPACITY)
+      for (const list of [this.times, this.values, this.least, this.most, this.hits]) list.shift();
     this.dirty = true;
   }
 

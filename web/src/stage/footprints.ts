@@ -1,6 +1,15 @@
 /** Where feet stood: soles on the floor that fade as others come. */
 
-import { Color, DoubleSide, ExtrudeGeometry, InstancedBufferAttribute, InstancedMesh, MeshBasicMaterial, Object3D, Shape } from "three";
+import {
+  Color,
+  DoubleSide,
+  ExtrudeGeometry,
+  InstancedBufferAttribute,
+  InstancedMesh,
+  MeshBasicMaterial,
+  Object3D,
+  Shape,
+} from "three";
 import { palette } from "./palette";
 
 function sole(): Shape {

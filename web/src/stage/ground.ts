@@ -16,7 +16,10 @@ export class Ground {
       shader.uniforms.coarseLine = { value: new Color(palette.gridCoarse) };
       shader.vertexShader = shader.vertexShader
         .replace("#include <common>", "#include <common>\nvarying vec3 vPlace;")
-        .replace("#include <begin_vertex>", "#include <begin_vertex>\nvPlace = (modelMatrix * vec4(position, 1.0)).xyz;");
+        .replace(
+          "#include <begin_vertex>",
+          "#include <begin_vertex>\nvPlace = (modelMatrix * vec4(position, 1.0)).xyz;",
+        );
       shader.fragmentShader = shader.fragmentShader
         .replace(
           "#include <common>",

@@ -9,7 +9,7 @@ export const palette = {
   roadEdge: 0xaab2be,
   obstacle: 0xb9bfc9,
   wall: 0x7d8592,
-  body: 0xdcd6cc,
+  body: 0xf1ece4,
   bodyJoint: 0xb9b1a4,
   accent: 0x2b50d8,
   input: 0xd42a2a,
@@ -20,4 +20,4 @@ export const palette = {
 } as const;
 
 /** Calm clothes of a crowd, told apart without shouting. */
-export const crowdColours = [0xdcd6cc, 0xc7ced8, 0xcfd6c9, 0xd8c9c3, 0xc9c6d6, 0xd9d2bd, 0xbfcfd2, 0xd2d2d4] as const;
+export const crowdColours = [0xeee8de, 0xc3cfe3, 0xc9dcc4, 0xe3c6bb, 0xcdc6e4, 0xe6d8ac, 0xb4d3d6, 0xd8d8dc] as const;

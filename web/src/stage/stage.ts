@@ -45,6 +45,7 @@ export class Stage {
   readonly renderer: WebGLRenderer;
   private readonly ground: Ground;
   private readonly sun: DirectionalLight;
+  private readonly fill: DirectionalLight;
   private readonly ticks = new Set<Tick>();
   private readonly ray = new Raycaster();
   private readonly pointer = new Vector2();
@@ -70,8 +71,8 @@ export class Stage {
     this.renderer.shadowMap.type = PCFShadowMap;
     this.scene.background = new Color(palette.sky);
     this.scene.fog = new Fog(palette.sky, 22, 95);
-    this.scene.add(new HemisphereLight(0xffffff, 0xc9c4bb, 2.1));
-    this.sun = new DirectionalLight(0xfff6e8, 2.2);
+    this.scene.add(new HemisphereLight(0xffffff, 0xd6d3ce, 1.75));
+    this.sun = new DirectionalLight(0xfff6ea, 1.9);
     this.sun.castShadow = options.shadows;
     this.sun.shadow.mapSize.setScalar(options.ratio < 1 ? 512 : 2048);
     this.sun.shadow.radius = 4;
@@ -79,6 +80,9 @@ export class Stage {
     this.sun.shadow.camera.near = 1;
     this.sun.shadow.camera.far = 120;
     this.scene.add(this.sun, this.sun.target);
+    // a little light from where one looks, so that nobody is a dark shape
+    this.fill = new DirectionalLight(0xffffff, 0.85);
+    this.scene.add(this.fill, this.fill.target);
     this.ground = new Ground(this.scene);
     new ResizeObserver(() => this.resize()).observe(this.element);
   }
@@ -176,6 +180,8 @@ export class Stage {
     const x = Math.round(this.cameras.target.x / texel) * texel;
     const z = Math.round(this.cameras.target.z / texel) * texel;
     this.sun.target.position.set(x, 0, z);
-    this.sun.position.set(x + 16, 34, z + 12);
+    this.sun.position.set(x + 15, 32, z - 13);
+    this.fill.position.copy(this.camera.position);
+    this.fill.target.position.copy(this.cameras.target);
   }
 }

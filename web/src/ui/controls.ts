@@ -102,12 +102,7 @@ export function segmented<T extends string>(
     inputs.set(choice.value, input);
     row.append(
       input,
-      el(
-        "label",
-        { for: id, title: choice.title },
-        choice.icon?.(),
-        el("span", { class: "text" }, choice.label),
-      ),
+      el("label", { for: id, title: choice.title }, choice.icon?.(), el("span", { class: "text" }, choice.label)),
     );
   }
   const element = el(
@@ -126,7 +121,12 @@ export function segmented<T extends string>(
 }
 
 /** On or off. */
-export function toggle(label: Child, value: boolean, onChange: (value: boolean) => void, swatch?: string): Control<boolean> {
+export function toggle(
+  label: Child,
+  value: boolean,
+  onChange: (value: boolean) => void,
+  swatch?: string,
+): Control<boolean> {
   const id = newId("toggle");
   const input = el("input", { type: "checkbox", id });
   input.checked = value;
@@ -191,9 +191,21 @@ export function numberField(options: NumberOptions): Control<number | null> {
 }
 
 /** A line of text. */
-export function textField(label: string, value: string, onCommit: (value: string) => void, placeholder = ""): Control<string> {
+export function textField(
+  label: string,
+  value: string,
+  onCommit: (value: string) => void,
+  placeholder = "",
+): Control<string> {
   const id = newId("text");
-  const input = el("input", { id, type: "text", maxlength: 200, placeholder, autocomplete: "off", spellcheck: "false" });
+  const input = el("input", {
+    id,
+    type: "text",
+    maxlength: 200,
+    placeholder,
+    autocomplete: "off",
+    spellcheck: "false",
+  });
   input.value = value;
   input.addEventListener("change", () => onCommit(input.value.trim()));
   return {
@@ -262,7 +274,11 @@ export function iconButton(label: string, icon: () => Node, onClick: () => void,
 }
 
 /** A part of a panel with a heading; it can be folded. */
-export function section(title: string, options: { open?: boolean; fold?: boolean } = {}, ...children: Child[]): HTMLElement {
+export function section(
+  title: string,
+  options: { open?: boolean; fold?: boolean } = {},
+  ...children: Child[]
+): HTMLElement {
   if (options.fold) {
     const details = el("details", { class: "section" }, el("summary", {}, title), ...children);
     details.open = options.open ?? true;

@@ -50,7 +50,8 @@ export function setText(node: Node, text: string): void {
 /** Whether keys belong to the element that has the focus (it is written into). */
 export function takesText(target: EventTarget | null): boolean {
   if (!(target instanceof HTMLElement)) return false;
-  if (target.isContentEditable || target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement) return true;
+  if (target.isContentEditable || target instanceof HTMLTextAreaElement || target instanceof HTMLSelectElement)
+    return true;
   return target instanceof HTMLInputElement && !["range", "checkbox", "radio", "button", "file"].includes(target.type);
 }
 

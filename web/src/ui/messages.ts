@@ -23,8 +23,17 @@ export class Messages {
     const words = `${title}|${text}`;
     const same = [...list.children].find((node) => (node as HTMLElement).dataset.words === words);
     same?.remove();
-    const close = el("button", { type: "button", class: "button icon small", "aria-label": "Close this message" }, icons.close());
-    const item = el("div", { class: `message ${tone}` }, el("p", {}, title && el("strong", {}, `${title} `), text), close);
+    const close = el(
+      "button",
+      { type: "button", class: "button icon small", "aria-label": "Close this message" },
+      icons.close(),
+    );
+    const item = el(
+      "div",
+      { class: `message ${tone}` },
+      el("p", {}, title && el("strong", {}, `${title} `), text),
+      close,
+    );
     item.dataset.words = words;
     const timer = setTimeout(() => item.remove(), LASTS[tone] + text.length * 40);
     close.addEventListener("click", () => {

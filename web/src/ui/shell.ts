@@ -18,7 +18,11 @@ export class Shell {
   private readonly link = el("span", { class: "link-text", role: "status" }, "Connecting");
   private readonly lamp = el("span", { class: "link-lamp" });
   private readonly name = el("span", { class: "database-name" });
-  private readonly curtain = el("div", { class: "curtain" }, el("p", { class: "curtain-text", role: "status" }, "Waking up …"));
+  private readonly curtain = el(
+    "div",
+    { class: "curtain" },
+    el("p", { class: "curtain-text", role: "status" }, "Waking up …"),
+  );
   private readonly dialog: HTMLDialogElement;
   private readonly helpBody = el("div", { class: "help-body" });
 
@@ -37,7 +41,12 @@ export class Shell {
       this.tabs.set(mode.name, tab);
       tabs.append(tab);
     }
-    this.dialog = el("dialog", { class: "help", "aria-labelledby": "help-title" }, el("h2", { id: "help-title" }, "Keys and gestures"), this.helpBody);
+    this.dialog = el(
+      "dialog",
+      { class: "help", "aria-labelledby": "help-title" },
+      el("h2", { id: "help-title" }, "Keys and gestures"),
+      this.helpBody,
+    );
     const close = button("Close", () => this.dialog.close(), { kind: "primary" });
     this.dialog.append(el("div", { class: "dialog-foot" }, close));
     this.dialog.addEventListener("click", (event) => event.target === this.dialog && this.dialog.close());
@@ -49,11 +58,26 @@ export class Shell {
       { class: "bar" },
       el("h1", { class: "brand" }, mark(), "stridecast"),
       tabs,
-      el("div", { class: "bar-end" }, this.name, el("span", { class: "link" }, this.lamp, this.link), eye, iconButton("Keys and gestures", icons.help, () => this.help(), "?")),
+      el(
+        "div",
+        { class: "bar-end" },
+        this.name,
+        el("span", { class: "link" }, this.lamp, this.link),
+        eye,
+        iconButton("Keys and gestures", icons.help, () => this.help(), "?"),
+      ),
     );
     options.hidden = true;
     this.element.append(
-      el("a", { class: "skip", href: "#stage", onclick: (event: Event) => (event.preventDefault(), stage.querySelector("canvas")?.focus()) }, "To the stage"),
+      el(
+        "a",
+        {
+          class: "skip",
+          href: "#stage",
+          onclick: (event: Event) => (event.preventDefault(), stage.querySelector("canvas")?.focus()),
+        },
+        "To the stage",
+      ),
       header,
       el("main", { class: "main" }, this.left, stage, this.right, options, messages.element, this.curtain),
       this.foot,
@@ -75,7 +99,14 @@ export class Shell {
     replace(this.left, mode.left);
     replace(this.right, mode.right);
     replace(this.foot, mode.foot);
-    replace(this.helpBody, el("dl", { class: "keys" }, ...mode.help.map(([keys, meaning]) => el("div", {}, el("dt", {}, keys), el("dd", {}, meaning)))));
+    replace(
+      this.helpBody,
+      el(
+        "dl",
+        { class: "keys" },
+        ...mode.help.map(([keys, meaning]) => el("div", {}, el("dt", {}, keys), el("dd", {}, meaning))),
+      ),
+    );
     this.element.dataset.mode = mode.name;
     document.title = `${TITLES[mode.name]} · stridecast`;
   }

@@ -73,11 +73,32 @@ export class DatabaseMode implements Mode {
       section("Your recordings", {}, this.uploading.element),
       section("Ask for a motion", {}, this.asking),
       section("Show only", {}, this.filters),
-      section("Take it with you", {}, exportButtons(page, [["bvh", "BVH", "The clip that plays"], ["glb", "GLB", "The clip that plays"], ["database", "Database", "The database that was built"]])),
+      section(
+        "Take it with you",
+        {},
+        exportButtons(page, [
+          ["bvh", "BVH", "The clip that plays"],
+          ["glb", "GLB", "The clip that plays"],
+          ["database", "Database", "The database that was built"],
+        ]),
+      ),
     );
-    const table = el("div", { class: "table", tabindex: 0, role: "region", "aria-label": "Segments" }, el("table", {}, this.head, this.rows), this.more);
+    const table = el(
+      "div",
+      { class: "table", tabindex: 0, role: "region", "aria-label": "Segments" },
+      el("table", {}, this.head, this.rows),
+      this.more,
+    );
     this.right.append(
-      el("section", { class: "section" }, el("h2", {}, "Segments"), this.scatter.element, this.legend(), this.tally, table),
+      el(
+        "section",
+        { class: "section" },
+        el("h2", {}, "Segments"),
+        this.scatter.element,
+        this.legend(),
+        this.tally,
+        table,
+      ),
       el("details", { class: "section" }, el("summary", {}, "Takes, and what was left out"), this.takes),
     );
     const { connection } = page;
@@ -161,8 +182,20 @@ export class DatabaseMode implements Mode {
     this.timeline.element.hidden = false;
     replace(
       this.told,
-      el("p", {}, el("strong", {}, clip.status.replace("-", " to ")), ` ${clip.speed.toFixed(2)} m/s, turning ${clip.turn.toFixed(2)} rad/s, mood ${clip.style.toFixed(2)}, ${clip.seconds.toFixed(1)} s`),
-      el("p", { class: "keyline" }, el("span", { class: "swatch dot body" }), clip.recorded ? "as recorded" : `blended of ${source}`, clip.beside && el("span", { class: "swatch dot beside" }), clip.beside && "the recording"),
+      el(
+        "p",
+        {},
+        el("strong", {}, clip.status.replace("-", " to ")),
+        ` ${clip.speed.toFixed(2)} m/s, turning ${clip.turn.toFixed(2)} rad/s, mood ${clip.style.toFixed(2)}, ${clip.seconds.toFixed(1)} s`,
+      ),
+      el(
+        "p",
+        { class: "keyline" },
+        el("span", { class: "swatch dot body" }),
+        clip.recorded ? "the clip, as recorded" : `the clip, blended of ${source}`,
+        clip.beside && el("span", { class: "swatch dot beside" }),
+        clip.beside && "the segment in its recording",
+      ),
       ...clip.warnings.map((warning) => el("p", { class: "warning" }, warning)),
     );
     this.page.connection.send({ type: "playback", action: "play" });
@@ -193,7 +226,10 @@ export class DatabaseMode implements Mode {
       rotationAt: 4 * frame.joints * i,
     }));
     people.show(everybody, stage.camera.position);
-    const middle = everybody.reduce((sum, { x, z }) => [sum[0] + x / everybody.length, sum[1] + z / everybody.length] as [number, number], [0, 0] as [number, number]);
+    const middle = everybody.reduce(
+      (sum, { x, z }) => [sum[0] + x / everybody.length, sum[1] + z / everybody.length] as [number, number],
+      [0, 0] as [number, number],
+    );
     stage.cameras.follow(middle[0], 0.8, middle[1]);
   }
 
@@ -228,8 +264,15 @@ export class DatabaseMode implements Mode {
     this.kept = [];
     for (let i = 0; i < speed.length; i++) {
       const motion = motions[group[i]!] ?? "";
-      if (filter.motion === "between" ? !motion.includes("-") : filter.motion !== "all" && motion !== filter.motion) continue;
-      if (speed[i]! < filter.slowest || speed[i]! > filter.fastest || style[i]! < filter.gloomiest || style[i]! > filter.briskest) continue;
+      if (filter.motion === "between" ? !motion.includes("-") : filter.motion !== "all" && motion !== filter.motion)
+        continue;
+      if (
+        speed[i]! < filter.slowest ||
+        speed[i]! > filter.fastest ||
+        style[i]! < filter.gloomiest ||
+        style[i]! > filter.briskest
+      )
+        continue;
       if (!filter.mirrored && mirrored[i]) continue;
       this.kept.push(i);
     }
@@ -267,15 +310,27 @@ export class DatabaseMode implements Mode {
         {},
         ...COLUMNS.map(({ key, label, title }) => {
           const sorted = key === this.sort;
-          const node = el("button", { type: "button", class: "sort", title: `${title}; press to sort` }, label, sorted && el("span", { "aria-hidden": "true" }, this.descending ? " ↓" : " ↑"));
+          const node = el(
+            "button",
+            { type: "button", class: "sort", title: `${title}; press to sort` },
+            label,
+            sorted && el("span", { "aria-hidden": "true" }, this.descending ? " ↓" : " ↑"),
+          );
           node.addEventListener("click", () => {
             this.descending = sorted && !this.descending;
             this.sort = key;
             this.order();
             this.drawRows();
-            (this.head.querySelectorAll("button")[COLUMNS.findIndex((column) => column.key === key)] as HTMLElement | undefined)?.focus();
+            (
+              this.head.querySelectorAll("button")[COLUMNS.findIndex((column) => column.key === key)] as
+                HTMLElement | undefined
+            )?.focus();
           });
-          return el("th", { scope: "col", "aria-sort": sorted ? (this.descending ? "descending" : "ascending") : undefined }, node);
+          return el(
+            "th",
+            { scope: "col", "aria-sort": sorted ? (this.descending ? "descending" : "ascending") : undefined },
+            node,
+          );
         }),
       ),
     );
@@ -288,10 +343,21 @@ export class DatabaseMode implements Mode {
         swatch.style.background = colourOf(group?.motion ?? "");
         const row = el(
           "tr",
-          { role: "row", tabindex: 0, "aria-selected": String(i === this.chosen), class: i === this.chosen ? "chosen" : "" },
+          {
+            role: "row",
+            tabindex: 0,
+            "aria-selected": String(i === this.chosen),
+            class: i === this.chosen ? "chosen" : "",
+          },
           el("td", {}, swatch, group?.name ?? ""),
-          ...[columns.speed[i]!, columns.turn[i]!, columns.style[i]!, columns.seconds[i]!].map((value) => el("td", { class: "figure" }, value.toFixed(2))),
-          el("td", { class: "take", title: state.takes[columns.take[i]!]?.name }, `${state.takes[columns.take[i]!]?.name ?? ""}${columns.mirrored[i] ? " ⇄" : ""}`),
+          ...[columns.speed[i]!, columns.turn[i]!, columns.style[i]!, columns.seconds[i]!].map((value) =>
+            el("td", { class: "figure" }, value.toFixed(2)),
+          ),
+          el(
+            "td",
+            { class: "take", title: state.takes[columns.take[i]!]?.name },
+            `${state.takes[columns.take[i]!]?.name ?? ""}${columns.mirrored[i] ? " ⇄" : ""}`,
+          ),
         );
         row.addEventListener("click", () => this.play(i));
         row.addEventListener("keydown", (event) => {
@@ -321,7 +387,13 @@ export class DatabaseMode implements Mode {
     const used = state.takes.length - left.length;
     replace(
       this.takes,
-      el("p", { class: "hint" }, left.length ? `${used} of ${state.takes.length} takes are used whole; of the others:` : `All ${state.takes.length} takes are used.`),
+      el(
+        "p",
+        { class: "hint" },
+        left.length
+          ? `${used} of ${state.takes.length} takes are used whole; of the others:`
+          : `All ${state.takes.length} takes are used.`,
+      ),
       el(
         "ul",
         { class: "takes" },
@@ -330,7 +402,11 @@ export class DatabaseMode implements Mode {
             "li",
             {},
             el("span", { class: "take-name" }, take.name),
-            el("span", { class: "take-facts" }, `${take.seconds.toFixed(1)} s · ${take.segments} segments${take.statuses.length ? ` · ${take.statuses.join(", ")}` : ""}`),
+            el(
+              "span",
+              { class: "take-facts" },
+              `${take.seconds.toFixed(1)} s · ${take.segments} segments${take.statuses.length ? ` · ${take.statuses.join(", ")}` : ""}`,
+            ),
             ...[...take.left_out, ...take.notes].map((why) => el("span", { class: "take-why" }, why)),
           ),
         ),
@@ -344,7 +420,14 @@ export class DatabaseMode implements Mode {
       swatch.style.background = colourOf(motion);
       return el("span", {}, swatch, label);
     };
-    return el("p", { class: "motion-key" }, entry("stand", "stand"), entry("walk", "walk"), entry("run", "run"), entry("-", "in between"));
+    return el(
+      "p",
+      { class: "motion-key" },
+      entry("stand", "stand"),
+      entry("walk", "walk"),
+      entry("run", "run"),
+      entry("-", "in between"),
+    );
   }
 
   private fillFilters(welcome: Welcome): void {
@@ -353,11 +436,34 @@ export class DatabaseMode implements Mode {
     const motions = [...new Set(database.groups.map((group) => group.motion))];
     const top = Math.ceil(Math.max(2, ...Object.values(database.top_speeds)) * 2) / 2 + 1;
     filter.fastest = Math.min(filter.fastest, top);
-    const bound = (label: string, key: "slowest" | "fastest" | "gloomiest" | "briskest", min: number, max: number, unit: string): Control<number> =>
-      slider({ label, min, max, step: 0.05, value: filter[key] > max ? max : filter[key], format: (value) => `${value.toFixed(2)}${unit}`, onInput: (value) => ((filter[key] = value), this.sieve()) });
+    const bound = (
+      label: string,
+      key: "slowest" | "fastest" | "gloomiest" | "briskest",
+      min: number,
+      max: number,
+      unit: string,
+    ): Control<number> =>
+      slider({
+        label,
+        min,
+        max,
+        step: 0.05,
+        value: filter[key] > max ? max : filter[key],
+        format: (value) => `${value.toFixed(2)}${unit}`,
+        onInput: (value) => ((filter[key] = value), this.sieve()),
+      });
     replace(
       this.filters,
-      select("Motion", [{ value: "all", label: "all" }, ...motions.filter((motion) => !motion.includes("-")).map((motion) => ({ value: motion, label: motion })), { value: "between", label: "in between" }], filter.motion, (motion) => ((filter.motion = motion), this.sieve())).element,
+      select(
+        "Motion",
+        [
+          { value: "all", label: "all" },
+          ...motions.filter((motion) => !motion.includes("-")).map((motion) => ({ value: motion, label: motion })),
+          { value: "between", label: "in between" },
+        ],
+        filter.motion,
+        (motion) => ((filter.motion = motion), this.sieve()),
+      ).element,
       bound("Not slower than", "slowest", 0, top, " m/s").element,
       bound("Not faster than", "fastest", 0, top, " m/s").element,
       bound("Not gloomier than", "gloomiest", -1, 1, "").element,
@@ -365,14 +471,31 @@ export class DatabaseMode implements Mode {
       toggle("Mirrored ones too", filter.mirrored, (on) => ((filter.mirrored = on), this.sieve())).element,
     );
     const ask = (label: string, key: "speed" | "turn" | "style", min: number, max: number, unit: string): HTMLElement =>
-      slider({ label, min, max, step: 0.05, value: wanted[key], format: (value) => `${value.toFixed(2)}${unit}`, onInput: (value) => (wanted[key] = value) }).element;
+      slider({
+        label,
+        min,
+        max,
+        step: 0.05,
+        value: wanted[key],
+        format: (value) => `${value.toFixed(2)}${unit}`,
+        onInput: (value) => (wanted[key] = value),
+      }).element;
     replace(
       this.asking,
-      select("Motion", database.motions.map((motion) => ({ value: motion as string, label: motion })), wanted.status, (status) => (wanted.status = status)).element,
+      select(
+        "Motion",
+        database.motions.map((motion) => ({ value: motion as string, label: motion })),
+        wanted.status,
+        (status) => (wanted.status = status),
+      ).element,
       ask("Speed", "speed", 0, top, " m/s"),
       ask("Turn", "turn", -2, 2, " rad/s"),
       ask("Mood", "style", -1, 1, ""),
-      el("div", { class: "button-row" }, button("Find and play", () => this.mine(), { kind: "primary" })),
+      el(
+        "div",
+        { class: "button-row" },
+        button("Find and play", () => this.mine(), { kind: "primary" }),
+      ),
     );
   }
 
@@ -380,7 +503,13 @@ export class DatabaseMode implements Mode {
     const { status, speed, turn, style } = this.wanted;
     this.chosen = -1;
     this.page.between.clear();
-    this.page.connection.send({ type: "mine", status, ...(status === "stand" ? {} : { speed, turn }), style, request: this.page.connection.nextRequest() });
+    this.page.connection.send({
+      type: "mine",
+      status,
+      ...(status === "stand" ? {} : { speed, turn }),
+      style,
+      request: this.page.connection.nextRequest(),
+    });
     this.drawRows();
   }
 }

@@ -16,7 +16,11 @@ export const colourOf = (motion: string): string => MOTION_COLOURS[motion] ?? BE
 
 export class Scatter {
   readonly element: HTMLElement;
-  private readonly canvas = el("canvas", { class: "scatter-canvas", role: "img", "aria-label": "Segments by speed and turn; the table below has the same ones" });
+  private readonly canvas = el("canvas", {
+    class: "scatter-canvas",
+    role: "img",
+    "aria-label": "Segments by speed and turn; the table below has the same ones",
+  });
   private readonly tip = el("div", { class: "tip", hidden: true });
   private columns: ExampleColumns | null = null;
   private motions: string[] = [];
@@ -134,7 +138,10 @@ export class Scatter {
       ink.fill();
     }
     ink.globalAlpha = 1;
-    for (const [i, colour] of [[this.hovered, "#171b22"], [this.chosen, "#171b22"]] as const) {
+    for (const [i, colour] of [
+      [this.hovered, "#171b22"],
+      [this.chosen, "#171b22"],
+    ] as const) {
       if (i < 0 || i >= columns.speed.length) continue;
       ink.strokeStyle = colour;
       ink.lineWidth = 2;

@@ -7,7 +7,12 @@ import { icons } from "../../ui/icons";
 import { size } from "../exports";
 import type { Page } from "../mode";
 
-const STAGES: Record<string, string> = { read: "Reading", analyse: "Analysing", assemble: "Assembling", compile: "Getting ready" };
+const STAGES: Record<string, string> = {
+  read: "Reading",
+  analyse: "Analysing",
+  assemble: "Assembling",
+  compile: "Getting ready",
+};
 
 export class Uploading {
   readonly element = el("div", { class: "uploading" });
@@ -17,7 +22,9 @@ export class Uploading {
   private readonly stage = el("p", { class: "hint", role: "status" });
   private readonly buildButton = button("Build a database", () => this.build(), { kind: "primary" });
   private readonly cancelButton = button("Cancel", () => this.page.connection.send({ type: "cancel" }), {});
-  private readonly forgetButton = button("Forget them", () => this.page.connection.send({ type: "forget_files" }), { kind: "quiet" });
+  private readonly forgetButton = button("Forget them", () => this.page.connection.send({ type: "forget_files" }), {
+    kind: "quiet",
+  });
   private readonly useButton = button("Use it", () => this.use("built"), { kind: "primary" });
   private readonly backButton = button("Back to the one before", () => this.use("given"), {});
   private building = false;
@@ -25,7 +32,14 @@ export class Uploading {
   private count = 0;
 
   constructor(private readonly page: Page) {
-    const input = el("input", { type: "file", multiple: true, accept: ".bvh,.amc,.asf", class: "visually-hidden", tabindex: -1, "aria-label": "Recordings" });
+    const input = el("input", {
+      type: "file",
+      multiple: true,
+      accept: ".bvh,.amc,.asf",
+      class: "visually-hidden",
+      tabindex: -1,
+      "aria-label": "Recordings",
+    });
     input.addEventListener("change", () => {
       void this.send([...(input.files ?? [])]);
       input.value = "";
@@ -37,7 +51,21 @@ export class Uploading {
       button("Choose files", () => input.click(), { icon: icons.open }),
       input,
     );
-    this.element.append(this.zone, this.files, this.bar, this.stage, el("div", { class: "button-row" }, this.buildButton, this.cancelButton, this.useButton, this.backButton, this.forgetButton));
+    this.element.append(
+      this.zone,
+      this.files,
+      this.bar,
+      this.stage,
+      el(
+        "div",
+        { class: "button-row" },
+        this.buildButton,
+        this.cancelButton,
+        this.useButton,
+        this.backButton,
+        this.forgetButton,
+      ),
+    );
     const { connection, messages } = page;
     connection.on("files", ({ files, bytes }) => this.have(files, bytes));
     connection.on("progress", ({ stage, done, total }) => {
@@ -48,7 +76,10 @@ export class Uploading {
     connection.on("built", ({ takes, left_out, examples, seconds, motions }) => {
       this.building = false;
       this.built = true;
-      setText(this.stage, `Built: ${examples} segments of ${motions.join(", ")} from ${takes} takes (${seconds.toFixed(0)} s)${left_out ? `, ${left_out} left out` : ""}.`);
+      setText(
+        this.stage,
+        `Built: ${examples} segments of ${motions.join(", ")} from ${takes} takes (${seconds.toFixed(0)} s)${left_out ? `, ${left_out} left out` : ""}.`,
+      );
       messages.say("The database is built. Press “Use it” to walk with it.", "good");
       this.show();
     });
@@ -93,7 +124,12 @@ export class Uploading {
 
   private have(files: string[], bytes: number): void {
     this.count = files.length;
-    setText(this.files, files.length ? `${files.length} ${files.length === 1 ? "file" : "files"}, ${size(bytes)}: ${files.slice(0, 6).join(", ")}${files.length > 6 ? " …" : ""}` : "");
+    setText(
+      this.files,
+      files.length
+        ? `${files.length} ${files.length === 1 ? "file" : "files"}, ${size(bytes)}: ${files.slice(0, 6).join(", ")}${files.length > 6 ? " …" : ""}`
+        : "",
+    );
     this.show();
   }
 
@@ -109,7 +145,11 @@ export class Uploading {
       setText(this.stage, `Sending ${file.name} (${i + 1} of ${files.length}) …`);
       try {
         const query = new URLSearchParams({ session: welcome.session, name: file.name });
-        const answer = await fetch(`files?${query}`, { method: "POST", body: file, headers: { "Content-Type": "application/octet-stream" } });
+        const answer = await fetch(`files?${query}`, {
+          method: "POST",
+          body: file,
+          headers: { "Content-Type": "application/octet-stream" },
+        });
         const said = (await answer.json()) as { error?: string };
         if (!answer.ok) messages.error(said.error ?? `The server did not take ${file.name}.`);
       } catch {
@@ -150,7 +190,9 @@ export class Uploading {
 export function refusal(file: { name: string; size: number }, limits: LimitsPart): string | null {
   const kinds = limits.file_kinds.map((kind) => kind.replace(/^\./, "").toLowerCase());
   const kind = file.name.split(".").pop()?.toLowerCase() ?? "";
-  if (!kinds.includes(kind)) return `${file.name} is no recording that can be read. Drop ${kinds.map((word) => word.toUpperCase()).join(", ")} files.`;
-  if (file.size > limits.file_bytes) return `${file.name} has ${size(file.size)}. Files have ${size(limits.file_bytes)} at most: cut it into shorter takes.`;
+  if (!kinds.includes(kind))
+    return `${file.name} is no recording that can be read. Drop ${kinds.map((word) => word.toUpperCase()).join(", ")} files.`;
+  if (file.size > limits.file_bytes)
+    return `${file.name} has ${size(file.size)}. Files have ${size(limits.file_bytes)} at most: cut it into shorter takes.`;
   return null;
 }

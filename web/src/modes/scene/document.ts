@@ -22,7 +22,14 @@ export interface Handle {
 
 export const KINDS: readonly Kind[] = ["roads", "obstacles", "walls", "movers", "people", "sources"];
 
-const WORDS: Record<Kind, string> = { roads: "road", obstacles: "obstacle", walls: "wall", movers: "mover", people: "person", sources: "source" };
+const WORDS: Record<Kind, string> = {
+  roads: "road",
+  obstacles: "obstacle",
+  walls: "wall",
+  movers: "mover",
+  people: "person",
+  sources: "source",
+};
 
 export const EMPTY: ScenePart = { version: 1 };
 
@@ -60,17 +67,25 @@ export function freshName(scene: ScenePart, kind: Kind): string {
 }
 
 /** The scene with one more thing, and where it is. */
-export function add<K extends Kind>(scene: ScenePart, kind: K, part: NonNullable<ScenePart[K]>[number]): [ScenePart, Ref] {
+export function add<K extends Kind>(
+  scene: ScenePart,
+  kind: K,
+  part: NonNullable<ScenePart[K]>[number],
+): [ScenePart, Ref] {
   const list = listOf(scene, kind) as Part[];
   const named = { ...part, name: part.name ?? freshName(scene, kind) } as Part;
-  return [{ ...scene, [kind]: [...list, named] }, { kind, index: list.length }];
+  return [
+    { ...scene, [kind]: [...list, named] },
+    { kind, index: list.length },
+  ];
 }
 
 export function remove(scene: ScenePart, refs: readonly Ref[]): ScenePart {
   const out: ScenePart = { ...scene };
   for (const kind of KINDS) {
     const gone = new Set(refs.filter((ref) => ref.kind === kind).map((ref) => ref.index));
-    if (gone.size) Object.assign(out, { [kind]: (listOf(scene, kind) as Part[]).filter((_, index) => !gone.has(index)) });
+    if (gone.size)
+      Object.assign(out, { [kind]: (listOf(scene, kind) as Part[]).filter((_, index) => !gone.has(index)) });
   }
   return out;
 }
@@ -94,7 +109,8 @@ export function behave(scene: ScenePart, ref: Ref, changes: BehaviorPart): Scene
 }
 
 const shift = ([x, z]: Point, dx: number, dz: number): Point => [round(x + dx), round(z + dz)];
-const shiftArea = (area: Area, dx: number, dz: number): Area => (isPoint(area) ? shift(area, dx, dz) : area.map((point) => shift(point, dx, dz)));
+const shiftArea = (area: Area, dx: number, dz: number): Area =>
+  isPoint(area) ? shift(area, dx, dz) : area.map((point) => shift(point, dx, dz));
 
 /** Centimetres are enough for what a hand draws, and read well in a file. */
 export function round(value: number): number {
@@ -114,9 +130,13 @@ export function moveBy(scene: ScenePart, ref: Ref, dx: number, dz: number): Scen
 export function handlesOf(scene: ScenePart, ref: Ref): Handle[] {
   const part = partOf(scene, ref);
   if (!part) return [];
-  const of = (points: readonly Point[], goal: number): Handle[] => points.map(([x, z], corner) => ({ x, z, goal, corner }));
+  const of = (points: readonly Point[], goal: number): Handle[] =>
+    points.map(([x, z], corner) => ({ x, z, goal, corner }));
   if ("start" in part) {
-    return [...of(pointsOf(part.start as Area), -1), ...goalsOf(part).flatMap((area, goal) => of(pointsOf(area), goal))];
+    return [
+      ...of(pointsOf(part.start as Area), -1),
+      ...goalsOf(part).flatMap((area, goal) => of(pointsOf(area), goal)),
+    ];
   }
   if ("center" in part) {
     const [x, z] = part.center;
@@ -133,7 +153,8 @@ export function moveHandle(scene: ScenePart, ref: Ref, handle: Handle, x: number
   const part = partOf(scene, ref);
   if (!part) return scene;
   const to: Point = [round(x), round(z)];
-  const put = (area: Area): Area => (isPoint(area) ? to : area.map((point, corner) => (corner === handle.corner ? to : point)));
+  const put = (area: Area): Area =>
+    isPoint(area) ? to : area.map((point, corner) => (corner === handle.corner ? to : point));
   if ("start" in part) {
     if (handle.goal < 0) return update(scene, ref, { start: put(part.start as Area) });
     const goals = goalsOf(part).map((area, goal) => (goal === handle.goal ? put(area) : area));

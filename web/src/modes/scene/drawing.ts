@@ -20,13 +20,31 @@ import {
 } from "three";
 import type { ScenePart } from "../../protocol";
 import { palette } from "../../stage/palette";
-import { type Area, goalsOf, handlesOf, isCircle, isPoint, listOf, type Point, pointsOf, type Ref, same } from "./document";
+import {
+  type Area,
+  goalsOf,
+  handlesOf,
+  isCircle,
+  isPoint,
+  listOf,
+  type Point,
+  pointsOf,
+  type Ref,
+  same,
+} from "./document";
 
 const OBSTACLE_HEIGHT = 0.9;
 const WALL_HEIGHT = 1.1;
 
 const flat = (colour: number, opacity = 1): MeshBasicMaterial =>
-  new MeshBasicMaterial({ color: colour, transparent: opacity < 1, opacity, depthWrite: false, side: DoubleSide, toneMapped: false });
+  new MeshBasicMaterial({
+    color: colour,
+    transparent: opacity < 1,
+    opacity,
+    depthWrite: false,
+    side: DoubleSide,
+    toneMapped: false,
+  });
 
 const materials = {
   edge: flat(palette.roadEdge),
@@ -73,7 +91,14 @@ export class SceneDrawing {
     const isChosen = (ref: Ref): boolean => chosen.some((other) => same(other, ref));
     // all edges lie below all roads, so crossings have no line across
     listOf(scene, "roads").forEach((road) => this.strip(road.points, road.width + 0.14, materials.edge, 0));
-    listOf(scene, "roads").forEach((road, index) => this.strip(road.points, road.width, isChosen({ kind: "roads", index }) ? materials.roadChosen : materials.road, 1));
+    listOf(scene, "roads").forEach((road, index) =>
+      this.strip(
+        road.points,
+        road.width,
+        isChosen({ kind: "roads", index }) ? materials.roadChosen : materials.road,
+        1,
+      ),
+    );
     listOf(scene, "obstacles").forEach((obstacle, index) => {
       const material = isChosen({ kind: "obstacles", index }) ? materials.chosen : materials.obstacle;
       if (isCircle(obstacle)) {
@@ -84,15 +109,24 @@ export class SceneDrawing {
       } else this.built.add(solid(block(obstacle.points, OBSTACLE_HEIGHT), material));
     });
     listOf(scene, "walls").forEach((wall, index) => {
-      this.built.add(solid(fence(wall.points, WALL_HEIGHT), isChosen({ kind: "walls", index }) ? materials.chosen : materials.wall));
+      this.built.add(
+        solid(fence(wall.points, WALL_HEIGHT), isChosen({ kind: "walls", index }) ? materials.chosen : materials.wall),
+      );
     });
-    listOf(scene, "people").forEach((person, index) => this.somebody(person.start as Area, goalsOf(person), isChosen({ kind: "people", index }), false));
-    listOf(scene, "sources").forEach((source, index) => this.somebody(source.start as Area, goalsOf(source), isChosen({ kind: "sources", index }), true));
+    listOf(scene, "people").forEach((person, index) =>
+      this.somebody(person.start as Area, goalsOf(person), isChosen({ kind: "people", index }), false),
+    );
+    listOf(scene, "sources").forEach((source, index) =>
+      this.somebody(source.start as Area, goalsOf(source), isChosen({ kind: "sources", index }), true),
+    );
     if (scene.start) this.somebody(scene.start, scene.goals ?? [], false, false);
     const only = chosen.length === 1 ? chosen[0] : undefined;
     if (only) {
       for (const handle of handlesOf(scene, only)) {
-        this.overlay.add(disc(handle.x, handle.z, 0.13, 0.035, flat(0xffffff), 10), disc(handle.x, handle.z, 0.095, 0.036, materials.handle, 11));
+        this.overlay.add(
+          disc(handle.x, handle.z, 0.13, 0.035, flat(0xffffff), 10),
+          disc(handle.x, handle.z, 0.095, 0.036, materials.handle, 11),
+        );
       }
     }
   }
@@ -102,10 +136,16 @@ export class SceneDrawing {
     clear(this.sketches);
     if (!points.length) return;
     const [first] = points;
-    if (options.circle !== undefined && first) this.sketches.add(disc(first[0], first[1], options.circle, 0.028, materials.sketch, 8));
+    if (options.circle !== undefined && first)
+      this.sketches.add(disc(first[0], first[1], options.circle, 0.028, materials.sketch, 8));
     else {
       if (options.closed && points.length > 2) this.sketches.add(area(points, 0.026, materials.area, 7));
-      const mesh = ribbon(options.closed ? [...points, points[0]!] : points, options.width ?? 0.08, materials.sketch, 8);
+      const mesh = ribbon(
+        options.closed ? [...points, points[0]!] : points,
+        options.width ?? 0.08,
+        materials.sketch,
+        8,
+      );
       mesh.position.y = 0.027;
       this.sketches.add(mesh);
     }
@@ -162,7 +202,10 @@ export class SceneDrawing {
   /** Mark a point, a line or an area; its middle. */
   private place(where: Area, filled: Material, line: Material, goal: boolean): Point {
     const points = pointsOf(where);
-    const middle: Point = [points.reduce((sum, [x]) => sum + x, 0) / points.length, points.reduce((sum, [, z]) => sum + z, 0) / points.length];
+    const middle: Point = [
+      points.reduce((sum, [x]) => sum + x, 0) / points.length,
+      points.reduce((sum, [, z]) => sum + z, 0) / points.length,
+    ];
     if (isPoint(where) || points.length === 1) {
       const ring = new Mesh(new RingGeometry(goal ? 0.11 : 0.24, goal ? 0.2 : 0.29, 36).rotateX(-Math.PI / 2), line);
       ring.position.set(middle[0], 0.024, middle[1]);

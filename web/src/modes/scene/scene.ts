@@ -13,7 +13,22 @@ import { icons } from "../../ui/icons";
 import type { PictureOptions } from "../../ui/options";
 import { exportButtons, saveText } from "../exports";
 import type { Mode, Page } from "../mode";
-import { allOf, EMPTY, extent, type Handle, handlesOf, listOf, moveBy, moveHandle, nameOf, partOf, type Ref, remove, same, thingAt } from "./document";
+import {
+  allOf,
+  EMPTY,
+  extent,
+  type Handle,
+  handlesOf,
+  listOf,
+  moveBy,
+  moveHandle,
+  nameOf,
+  partOf,
+  type Ref,
+  remove,
+  same,
+  thingAt,
+} from "./document";
 import { SceneDrawing } from "./drawing";
 import { History } from "./history";
 import { inspector } from "./inspector";
@@ -85,8 +100,22 @@ export class SceneMode implements Mode {
   private readonly undoButton = iconButton("Undo", icons.undo, () => this.undo(), "Ctrl Z");
   private readonly redoButton = iconButton("Redo", icons.redo, () => this.redo(), "Ctrl Y");
   private readonly view;
-  private readonly path = new Ribbon({ colour: palette.accent, width: 0.07, height: 0.03, capacity: 600, opacity: 0.9, fades: false });
-  private readonly window = new Ribbon({ colour: palette.chosen, width: 0.6, height: 0.026, capacity: 600, opacity: 0.42, fades: false });
+  private readonly path = new Ribbon({
+    colour: palette.accent,
+    width: 0.07,
+    height: 0.03,
+    capacity: 600,
+    opacity: 0.9,
+    fades: false,
+  });
+  private readonly window = new Ribbon({
+    colour: palette.chosen,
+    width: 0.6,
+    height: 0.026,
+    capacity: 600,
+    opacity: 0.42,
+    fades: false,
+  });
   private sendTimer: ReturnType<typeof setTimeout> | undefined;
   private lookedAt = 0;
   private looked = "";
@@ -266,8 +295,15 @@ export class SceneMode implements Mode {
       this.list,
       ...all.map((ref) => {
         const chosen = this.chosen.some((other) => same(other, ref));
-        const item = el("button", { type: "button", class: "thing", "aria-pressed": String(chosen) }, glyphOf(this.scene, ref)(), el("span", { class: "text" }, nameOf(this.scene, ref)));
-        item.addEventListener("click", (event) => this.choose(event.shiftKey || event.ctrlKey ? toggled(this.chosen, ref) : [ref]));
+        const item = el(
+          "button",
+          { type: "button", class: "thing", "aria-pressed": String(chosen) },
+          glyphOf(this.scene, ref)(),
+          el("span", { class: "text" }, nameOf(this.scene, ref)),
+        );
+        item.addEventListener("click", (event) =>
+          this.choose(event.shiftKey || event.ctrlKey ? toggled(this.chosen, ref) : [ref]),
+        );
         return el("li", {}, item);
       }),
     );
@@ -324,7 +360,12 @@ export class SceneMode implements Mode {
     // nearer to the eye than what is looked at: those are seen large
     const x = cameras.target.x * 0.75 + camera.position.x * 0.25;
     const z = cameras.target.z * 0.75 + camera.position.z * 0.25;
-    const message = { type: "view", center: [Math.round(x * 4) / 4, Math.round(z * 4) / 4] as [number, number], radius: Math.round(Math.max(15, cameras.eye.distance * 1.6)), full: this.options.poses } as const;
+    const message = {
+      type: "view",
+      center: [Math.round(x * 4) / 4, Math.round(z * 4) / 4] as [number, number],
+      radius: Math.round(Math.max(15, cameras.eye.distance * 1.6)),
+      full: this.options.poses,
+    } as const;
     const words = JSON.stringify(message);
     if (words === this.looked) return;
     if (this.page.connection.send(message)) this.looked = words;
@@ -368,8 +409,19 @@ export class SceneMode implements Mode {
       : [
           el("p", { class: "rule" }, told.rule),
           el("p", { class: "why" }, `${told.why[0]?.toUpperCase() ?? ""}${told.why.slice(1)}.`),
-          el("dl", { class: "readings" }, ...facts.map(([name, value]) => el("div", { class: "reading" }, el("dt", {}, name), el("dd", {}, value)))),
-          el("p", { class: "keyline" }, el("span", { class: "swatch path" }), "way that is left", el("span", { class: "swatch window" }), "reserved to brake"),
+          el(
+            "dl",
+            { class: "readings" },
+            ...facts.map(([name, value]) => el("div", { class: "reading" }, el("dt", {}, name), el("dd", {}, value))),
+          ),
+          el(
+            "p",
+            { class: "keyline" },
+            el("span", { class: "swatch path" }),
+            "way that is left",
+            el("span", { class: "swatch window" }),
+            "reserved to brake",
+          ),
         ];
     replace(this.explained, el("section", { class: "section explained" }, title, ...told_));
   }
@@ -417,7 +469,9 @@ export class SceneMode implements Mode {
     }
     const run = `drag ${performance.now()}`;
     const only = this.chosen.length === 1 ? this.chosen[0] : undefined;
-    const handle = only && handlesOf(this.scene, only).find((found) => Math.hypot(found.x - spot.x, found.z - spot.z) < this.reach * 1.3);
+    const handle =
+      only &&
+      handlesOf(this.scene, only).find((found) => Math.hypot(found.x - spot.x, found.z - spot.z) < this.reach * 1.3);
     if (only && handle) {
       this.drag = { what: "handle", handle, ref: only, id, run };
       return;
@@ -430,7 +484,8 @@ export class SceneMode implements Mode {
       const ref: Ref | null = index >= 0 ? { kind: "people", index } : null;
       if (ref) {
         this.choose(event.shiftKey ? toggled(this.chosen, ref) : [ref]);
-        if (this.atStart) this.drag = { what: "things", from: spot, scene: this.scene, refs: this.chosen, id, moved: false, run };
+        if (this.atStart)
+          this.drag = { what: "things", from: spot, scene: this.scene, refs: this.chosen, id, moved: false, run };
       } else this.choose([]);
       return;
     }
@@ -464,7 +519,11 @@ export class SceneMode implements Mode {
       const [dx, dz] = [spot.x - drag.from.x, spot.z - drag.from.z];
       if (!drag.moved && Math.hypot(dx, dz) < this.reach * 0.6) return;
       drag.moved = true;
-      this.change(drag.refs.reduce((scene, ref) => moveBy(scene, ref, dx, dz), drag.scene), drag.run, drag.refs);
+      this.change(
+        drag.refs.reduce((scene, ref) => moveBy(scene, ref, dx, dz), drag.scene),
+        drag.run,
+        drag.refs,
+      );
     } else if (this.tool !== "select") this.hands.move(this.tool, spot);
   }
 
@@ -500,9 +559,15 @@ export class SceneMode implements Mode {
       if (!feet.front) continue;
       const tall = Math.hypot(head.left - feet.left, head.top - feet.top);
       const wide = Math.max(7, (tall / 1.7) * BODY);
-      const t = tall ? ((clientX - feet.left) * (head.left - feet.left) + (clientY - feet.top) * (head.top - feet.top)) / tall ** 2 : 0;
+      const t = tall
+        ? ((clientX - feet.left) * (head.left - feet.left) + (clientY - feet.top) * (head.top - feet.top)) / tall ** 2
+        : 0;
       const on = Math.min(1, Math.max(0, t));
-      const off = Math.hypot(clientX - feet.left - on * (head.left - feet.left), clientY - feet.top - on * (head.top - feet.top)) / wide;
+      const off =
+        Math.hypot(
+          clientX - feet.left - on * (head.left - feet.left),
+          clientY - feet.top - on * (head.top - feet.top),
+        ) / wide;
       if (off < 1 && off < least) {
         least = off;
         best = frame.ids[i]!;
@@ -558,11 +623,19 @@ export class SceneMode implements Mode {
     const step = far ? 1 : 0.25;
     // to the nearest of the axes, as seen
     const quarter = Math.round(cameras.ahead / (Math.PI / 2)) * (Math.PI / 2);
-    const [right, up] = ({ ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] } as Record<string, [number, number]>)[key]!;
+    const [right, up] = (
+      { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] } as Record<
+        string,
+        [number, number]
+      >
+    )[key]!;
     const dx = (Math.sin(quarter) * up - Math.cos(quarter) * right) * step;
     const dz = (Math.cos(quarter) * up + Math.sin(quarter) * right) * step;
     if (this.tool === "select" && this.chosen.length) {
-      this.change(this.chosen.reduce((scene, ref) => moveBy(scene, ref, dx, dz), this.scene), "arrows");
+      this.change(
+        this.chosen.reduce((scene, ref) => moveBy(scene, ref, dx, dz), this.scene),
+        "arrows",
+      );
       return;
     }
     const at = this.cursor ?? { x: Math.round(cameras.target.x * 4) / 4, z: Math.round(cameras.target.z * 4) / 4 };
@@ -600,14 +673,20 @@ export class SceneMode implements Mode {
   private save(): void {
     const { connection } = this.page;
     if (!connection.send({ type: "save_scene", scene: this.scene, request: connection.nextRequest() })) {
-      this.page.messages.error("There is no connection to the server, which writes the file. Wait until it is back, then save again.");
+      this.page.messages.error(
+        "There is no connection to the server, which writes the file. Wait until it is back, then save again.",
+      );
     }
   }
 
   private async read(file: File): Promise<void> {
     const { connection, messages } = this.page;
-    if (file.size > 2 * 2 ** 20) messages.error(`${file.name} has ${(file.size / 2 ** 20).toFixed(1)} MB. Scenes have 2 MB at most.`);
-    else if (!connection.send({ type: "open_scene", text: await file.text(), request: connection.nextRequest() })) messages.error("There is no connection to the server, which reads the file. Wait until it is back, then open it again.");
+    if (file.size > 2 * 2 ** 20)
+      messages.error(`${file.name} has ${(file.size / 2 ** 20).toFixed(1)} MB. Scenes have 2 MB at most.`);
+    else if (!connection.send({ type: "open_scene", text: await file.text(), request: connection.nextRequest() }))
+      messages.error(
+        "There is no connection to the server, which reads the file. Wait until it is back, then open it again.",
+      );
   }
 
   private fill(): void {
@@ -619,22 +698,50 @@ export class SceneMode implements Mode {
       this.toolButtons.set(tool, node);
       tools.append(node);
     }
-    const file = el("input", { type: "file", accept: ".yaml,.yml,application/yaml", class: "visually-hidden", "aria-label": "Scene file", tabindex: -1 });
+    const file = el("input", {
+      type: "file",
+      accept: ".yaml,.yml,application/yaml",
+      class: "visually-hidden",
+      "aria-label": "Scene file",
+      tabindex: -1,
+    });
     file.addEventListener("change", () => {
       const picked = file.files?.[0];
       if (picked) void this.read(picked);
       file.value = "";
     });
     this.left.append(
-      section("Draw", {}, tools, el("div", { class: "button-row" }, this.undoButton, this.redoButton, button("See all of it", () => this.fit(), { icon: icons.fit, key: "0" }))),
+      section(
+        "Draw",
+        {},
+        tools,
+        el(
+          "div",
+          { class: "button-row" },
+          this.undoButton,
+          this.redoButton,
+          button("See all of it", () => this.fit(), { icon: icons.fit, key: "0" }),
+        ),
+      ),
       section("See", {}, this.view.element),
       el("section", { class: "section" }, el("h2", {}, "In the scene ", this.count), this.list),
       section(
         "Scene",
         {},
-        el("div", { class: "button-row" }, button("Open", () => file.click(), { icon: icons.open, title: "Open a scene file (YAML)" }), button("Save", () => this.save(), { icon: icons.save, title: "Save as a scene file (Ctrl S)" }), button("New", () => this.open(EMPTY), { title: "Begin with empty ground; undo brings this one back" })),
+        el(
+          "div",
+          { class: "button-row" },
+          button("Open", () => file.click(), { icon: icons.open, title: "Open a scene file (YAML)" }),
+          button("Save", () => this.save(), { icon: icons.save, title: "Save as a scene file (Ctrl S)" }),
+          button("New", () => this.open(EMPTY), { title: "Begin with empty ground; undo brings this one back" }),
+        ),
         file,
-        el("div", { class: "button-row" }, button("Crossing", () => this.open(crossing), { kind: "quiet" }), button("Busy square", () => this.open(square), { kind: "quiet" })),
+        el(
+          "div",
+          { class: "button-row" },
+          button("Crossing", () => this.open(crossing), { kind: "quiet" }),
+          button("Busy square", () => this.open(square), { kind: "quiet" }),
+        ),
       ),
       section(
         "Take it with you",
@@ -656,6 +763,12 @@ function toggled(refs: readonly Ref[], ref: Ref): Ref[] {
 
 function glyphOf(scene: ScenePart, ref: Ref): () => Node {
   if (ref.kind === "obstacles") return "center" in (partOf(scene, ref) ?? {}) ? icons.circle : icons.polygon;
-  const glyphs = { roads: icons.road, walls: icons.wall, movers: icons.circle, people: icons.person, sources: icons.source };
+  const glyphs = {
+    roads: icons.road,
+    walls: icons.wall,
+    movers: icons.circle,
+    people: icons.person,
+    sources: icons.source,
+  };
   return glyphs[ref.kind];
 }

@@ -2,7 +2,13 @@
 
 import type { PersonPart, ScenePart } from "../../protocol";
 
-const somebody = (name: string, start: [number, number], goal: [number, number], velocity: number, more: Partial<PersonPart> = {}): PersonPart => ({
+const somebody = (
+  name: string,
+  start: [number, number],
+  goal: [number, number],
+  velocity: number,
+  more: Partial<PersonPart> = {},
+): PersonPart => ({
   name,
   start,
   goals: [goal],
@@ -14,11 +20,33 @@ const somebody = (name: string, start: [number, number], goal: [number, number],
 export const crossing: ScenePart = {
   version: 1,
   roads: [
-    { name: "long street", points: [[-15, 0], [15, 0]], width: 6 },
-    { name: "side street", points: [[0, -13], [0, 13]], width: 5 },
+    {
+      name: "long street",
+      points: [
+        [-15, 0],
+        [15, 0],
+      ],
+      width: 6,
+    },
+    {
+      name: "side street",
+      points: [
+        [0, -13],
+        [0, 13],
+      ],
+      width: 5,
+    },
   ],
   obstacles: [
-    { name: "kiosk", points: [[-4.1, 1.2], [-2.7, 1.2], [-2.7, 2.6], [-4.1, 2.6]] },
+    {
+      name: "kiosk",
+      points: [
+        [-4.1, 1.2],
+        [-2.7, 1.2],
+        [-2.7, 2.6],
+        [-4.1, 2.6],
+      ],
+    },
     { name: "tree", center: [4.2, -1.7], radius: 0.4 },
     { name: "lamp", center: [-8, -2.2], radius: 0.2 },
   ],
@@ -32,8 +60,38 @@ export const crossing: ScenePart = {
     somebody("Gil", [12, -1], [-12, -1], 2.8, { behavior: { velocity: 2.8, status: "run" }, begins: 2 }),
   ],
   sources: [
-    { name: "from the north", start: [[-1.8, 12], [1.8, 12]], goals: [[[14, -2], [14, 2]]], flow: 0.25, most: 12, velocity: { mean: 1.3, deviation: 0.2, least: 0.9, most: 1.8 } },
-    { name: "from the south", start: [[1.8, -12], [-1.8, -12]], goals: [[[-14, 2], [-14, -2]]], flow: 0.25, most: 12, velocity: { mean: 1.3, deviation: 0.2, least: 0.9, most: 1.8 } },
+    {
+      name: "from the north",
+      start: [
+        [-1.8, 12],
+        [1.8, 12],
+      ],
+      goals: [
+        [
+          [14, -2],
+          [14, 2],
+        ],
+      ],
+      flow: 0.25,
+      most: 12,
+      velocity: { mean: 1.3, deviation: 0.2, least: 0.9, most: 1.8 },
+    },
+    {
+      name: "from the south",
+      start: [
+        [1.8, -12],
+        [-1.8, -12],
+      ],
+      goals: [
+        [
+          [-14, 2],
+          [-14, -2],
+        ],
+      ],
+      flow: 0.25,
+      most: 12,
+      velocity: { mean: 1.3, deviation: 0.2, least: 0.9, most: 1.8 },
+    },
   ],
   seconds: 90,
   seed: 7,
@@ -45,10 +103,50 @@ export const square: ScenePart = {
   obstacles: [{ name: "fountain", center: [0, 0], radius: 2 }],
   sources: (
     [
-      ["west", [[-22, 5], [-22, -5]], [[22, -5], [22, 5]]],
-      ["east", [[22, -5], [22, 5]], [[-22, 5], [-22, -5]]],
-      ["north", [[5, 22], [-5, 22]], [[-5, -22], [5, -22]]],
-      ["south", [[-5, -22], [5, -22]], [[5, 22], [-5, 22]]],
+      [
+        "west",
+        [
+          [-22, 5],
+          [-22, -5],
+        ],
+        [
+          [22, -5],
+          [22, 5],
+        ],
+      ],
+      [
+        "east",
+        [
+          [22, -5],
+          [22, 5],
+        ],
+        [
+          [-22, 5],
+          [-22, -5],
+        ],
+      ],
+      [
+        "north",
+        [
+          [5, 22],
+          [-5, 22],
+        ],
+        [
+          [-5, -22],
+          [5, -22],
+        ],
+      ],
+      [
+        "south",
+        [
+          [-5, -22],
+          [5, -22],
+        ],
+        [
+          [5, 22],
+          [-5, 22],
+        ],
+      ],
     ] as [string, [number, number][], [number, number][]][]
   ).map(([name, start, goal]) => ({
     name,

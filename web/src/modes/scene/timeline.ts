@@ -14,7 +14,14 @@ export class Timeline {
   private pace = 1;
   private readonly play: HTMLButtonElement;
   private readonly paceText = el("output", { class: "pace", "aria-label": "Pace" }, "1×");
-  private readonly line = el("input", { type: "range", class: "scrub", min: 0, max: 0, step: 0.01, "aria-label": "Time" });
+  private readonly line = el("input", {
+    type: "range",
+    class: "scrub",
+    min: 0,
+    max: 0,
+    step: 0.01,
+    "aria-label": "Time",
+  });
   private readonly clock = el("span", { class: "clock" }, "0.0 s");
   private readonly counts = el("span", { class: "counts" });
   private scrubbing = false;
@@ -91,10 +98,10 @@ export class Timeline {
     this.fill();
     setText(this.clock, `${state.time.toFixed(1)} s`);
     this.line.setAttribute("aria-valuetext", `${state.time.toFixed(1)} seconds`);
-    const parts = state.came || state.there ? [`${state.there} there`, `${state.arrived} arrived`] : [];
+    const parts = state.mode === "scene" && (state.came || state.there) ? [`${state.there} there`, `${state.arrived} arrived`] : [];
     if (state.waiting) parts.push(`${state.waiting} waiting`);
     if (state.turned_away) parts.push(`${state.turned_away} without a way`);
-    if (state.done) parts.push("done");
+    if (state.done && state.mode === "scene") parts.push("done");
     setText(this.counts, parts.join(" · "));
   }
 

@@ -2,13 +2,26 @@
 
 import type { ScenePart } from "../../protocol";
 import type { Spot } from "../../stage/stage";
-import { add, type Area, goalsOf, listOf, partOf, pointsOf, type Point, type Ref, round, setGoals, update } from "./document";
+import {
+  add,
+  type Area,
+  goalsOf,
+  listOf,
+  partOf,
+  pointsOf,
+  type Point,
+  type Ref,
+  round,
+  setGoals,
+  update,
+} from "./document";
 import type { PersonPart, SourcePart } from "../../protocol";
 
 export type Tool = "select" | "road" | "circle" | "polygon" | "wall" | "person" | "source" | "start" | "goal";
 
 export const HINTS: Record<Tool, string> = {
-  select: "Click to choose, shift-click for more, drag to move. Drag the ground to shift the view, drag with the right button to turn it.",
+  select:
+    "Click to choose, shift-click for more, drag to move. Drag the ground to shift the view, drag with the right button to turn it.",
   road: "Click point after point, double-click or press Enter to end the road. Or drag from one end to the other.",
   circle: "Press where the middle is to be, and drag to the rim.",
   polygon: "Click the corners one after the other, double-click or press Enter to close.",
@@ -76,7 +89,12 @@ export class Drawing {
     }
     if (tool === "road" || tool === "wall" || tool === "polygon") {
       const so = this.points.length ? this.points : from && pulled ? [at(from)] : [];
-      if (so.length) this.events.draft({ points: [...so, at(spot)], closed: tool === "polygon", ...(tool === "road" ? { width: 3 } : {}) });
+      if (so.length)
+        this.events.draft({
+          points: [...so, at(spot)],
+          closed: tool === "polygon",
+          ...(tool === "road" ? { width: 3 } : {}),
+        });
       return;
     }
     if (from && pulled) this.events.draft({ points: [at(from), at(spot)], closed: false });
@@ -105,11 +123,19 @@ export class Drawing {
         return;
       case "person":
         events.draft(null);
-        this.put(add(scene, "people", { start: at(from), goals: pulled ? [at(spot)] : [], behavior: { velocity: 1.3 } }));
+        this.put(
+          add(scene, "people", { start: at(from), goals: pulled ? [at(spot)] : [], behavior: { velocity: 1.3 } }),
+        );
         return;
       case "source":
         events.draft(null);
-        this.put(add(scene, "sources", { start: pulled ? [at(from), at(spot)] : at(from), flow: 0.5, velocity: { mean: 1.3, deviation: 0.2, least: 0.9, most: 1.8 } }));
+        this.put(
+          add(scene, "sources", {
+            start: pulled ? [at(from), at(spot)] : at(from),
+            flow: 0.5,
+            velocity: { mean: 1.3, deviation: 0.2, least: 0.9, most: 1.8 },
+          }),
+        );
         return;
       case "start":
       case "goal":
@@ -122,7 +148,8 @@ export class Drawing {
   private point(tool: "road" | "wall" | "polygon", spot: Spot): void {
     const first = this.points[0];
     const last = this.points[this.points.length - 1];
-    const near = (point: Point | undefined): boolean => point !== undefined && Math.hypot(point[0] - spot.x, point[1] - spot.z) < NEAR;
+    const near = (point: Point | undefined): boolean =>
+      point !== undefined && Math.hypot(point[0] - spot.x, point[1] - spot.z) < NEAR;
     if (near(last) || (tool === "polygon" && this.points.length > 2 && near(first))) {
       this.finish(tool);
       return;
@@ -137,7 +164,12 @@ export class Drawing {
     const least = tool === "polygon" ? 3 : 2;
     if (tool !== "road" && tool !== "wall" && tool !== "polygon") return false;
     if (points.length < least) {
-      if (points.length) events.say(tool === "polygon" ? "A polygon needs three corners; click one more." : "A line needs two points; click one more.");
+      if (points.length)
+        events.say(
+          tool === "polygon"
+            ? "A polygon needs three corners; click one more."
+            : "A line needs two points; click one more.",
+        );
       return points.length > 0;
     }
     const line = [...points];
@@ -160,11 +192,17 @@ export class Drawing {
     let refs = events.chosen().filter((ref) => ref.kind === "people" || ref.kind === "sources");
     if (!refs.length && tool === "goal") {
       refs = (["people", "sources"] as const).flatMap((kind) =>
-        listOf(scene, kind).flatMap((part, index) => (goalsOf(part as PersonPart | SourcePart).length ? [] : [{ kind, index }])),
+        listOf(scene, kind).flatMap((part, index) =>
+          goalsOf(part as PersonPart | SourcePart).length ? [] : [{ kind, index }],
+        ),
       );
     }
     if (!refs.length) {
-      events.say(tool === "goal" ? "Everybody has a goal. Choose people or a source first, to give them another." : "Choose people or a source first, then click where they start.");
+      events.say(
+        tool === "goal"
+          ? "Everybody has a goal. Choose people or a source first, to give them another."
+          : "Choose people or a source first, then click where they start.",
+      );
       return;
     }
     const middle = centre(where);
@@ -173,7 +211,10 @@ export class Drawing {
       const part = partOf(scene, ref) as PersonPart | SourcePart;
       if (tool === "goal") scene = setGoals(scene, ref, more ? [...goalsOf(part), where] : [where]);
       // several people cannot stand in one place
-      else scene = update(scene, ref, { start: refs.length === 1 ? where : [round(middle[0] + spread[i]! * 0.8), round(middle[1])] });
+      else
+        scene = update(scene, ref, {
+          start: refs.length === 1 ? where : [round(middle[0] + spread[i]! * 0.8), round(middle[1])],
+        });
     });
     events.change(scene, refs);
   }
@@ -184,5 +225,8 @@ const apart = (a: Spot, b: Spot): number => Math.hypot(a.x - b.x, a.z - b.z);
 
 function centre(area: Area): Point {
   const points = pointsOf(area);
-  return [points.reduce((sum, [x]) => sum + x, 0) / points.length, points.reduce((sum, [, z]) => sum + z, 0) / points.length];
+  return [
+    points.reduce((sum, [x]) => sum + x, 0) / points.length,
+    points.reduce((sum, [, z]) => sum + z, 0) / points.length,
+  ];
 }

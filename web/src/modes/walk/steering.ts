@@ -121,7 +121,8 @@ export class Steering {
       const dx = event.clientX - this.turning.x;
       const dy = event.clientY - this.turning.y;
       Object.assign(this.turning, { x: event.clientX, y: event.clientY });
-      if (this.turning.pan) this.stage.cameras.pan(-dx / this.stage.canvas.clientHeight, dy / this.stage.canvas.clientHeight);
+      if (this.turning.pan)
+        this.stage.cameras.pan(-dx / this.stage.canvas.clientHeight, dy / this.stage.canvas.clientHeight);
       else this.stage.cameras.rotate(dx * 0.006, dy * 0.006);
       return;
     }
@@ -156,7 +157,12 @@ export class Steering {
     if (!this.active) return;
     this.stage.canvas.focus({ preventScroll: true });
     if (event.button === 2 || event.button === 1) {
-      this.turning = { x: event.clientX, y: event.clientY, id: event.pointerId, pan: event.button === 1 || event.shiftKey };
+      this.turning = {
+        x: event.clientX,
+        y: event.clientY,
+        id: event.pointerId,
+        pan: event.button === 1 || event.shiftKey,
+      };
       this.stage.canvas.setPointerCapture(event.pointerId);
       event.preventDefault();
       return;
@@ -250,10 +256,7 @@ export class Steering {
     const ahead = this.stage.cameras.ahead;
     const clip = (x: number): number => Math.min(1, Math.max(-1, x));
     // the left of who looks along a heading is (cos, -sin); the right its opposite
-    return [
-      clip(Math.sin(ahead) * up - Math.cos(ahead) * right),
-      clip(Math.cos(ahead) * up + Math.sin(ahead) * right),
-    ];
+    return [clip(Math.sin(ahead) * up - Math.cos(ahead) * right), clip(Math.cos(ahead) * up + Math.sin(ahead) * right)];
   }
 
   // before each picture

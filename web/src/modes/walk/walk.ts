@@ -76,8 +76,22 @@ export class WalkMode implements Mode {
     vehicle: new Ribbon({ colour: palette.vehicle, width: 0.034, height: 0.02, capacity: 420 }),
     pelvis: new Ribbon({ colour: palette.pelvis, width: 0.026, height: 0.022, capacity: 420 }),
   };
-  private readonly way = new Ribbon({ colour: palette.accent, width: 0.06, height: 0.014, capacity: 2000, opacity: 0.4, fades: false });
-  private readonly sketch = new Ribbon({ colour: palette.input, width: 0.05, height: 0.024, capacity: 4000, opacity: 0.8, fades: false });
+  private readonly way = new Ribbon({
+    colour: palette.accent,
+    width: 0.06,
+    height: 0.014,
+    capacity: 2000,
+    opacity: 0.4,
+    fades: false,
+  });
+  private readonly sketch = new Ribbon({
+    colour: palette.input,
+    width: 0.05,
+    height: 0.024,
+    capacity: 4000,
+    opacity: 0.8,
+    fades: false,
+  });
   private readonly prints = new Footprints(80);
   private readonly target: Mesh;
   private readonly dot: Mesh;
@@ -175,14 +189,28 @@ export class WalkMode implements Mode {
     this.between();
     stage.shadowReach = 7;
     stage.setReach(70);
-    stage.scene.add(this.target, this.dot, this.prints.mesh, this.way.mesh, this.sketch.mesh, ...Object.values(this.trails).map((trail) => trail.mesh));
+    stage.scene.add(
+      this.target,
+      this.dot,
+      this.prints.mesh,
+      this.way.mesh,
+      this.sketch.mesh,
+      ...Object.values(this.trails).map((trail) => trail.mesh),
+    );
     this.steering.enter();
     this.chooseView(this.controls?.view.get() ?? "follow");
   }
 
   leave(): void {
     this.steering.leave();
-    this.page.stage.scene.remove(this.target, this.dot, this.prints.mesh, this.way.mesh, this.sketch.mesh, ...Object.values(this.trails).map((trail) => trail.mesh));
+    this.page.stage.scene.remove(
+      this.target,
+      this.dot,
+      this.prints.mesh,
+      this.way.mesh,
+      this.sketch.mesh,
+      ...Object.values(this.trails).map((trail) => trail.mesh),
+    );
   }
 
   /** Begin with clean ground. */
@@ -210,11 +238,23 @@ export class WalkMode implements Mode {
     const acted = (name: (typeof CLAMPED)[number]): boolean => (playing.clamped & (1 << CLAMPED.indexOf(name))) !== 0;
     const speed = Math.hypot(steering.velocity_x, steering.velocity_z);
     this.meters.speed.set(speed, 0, steering.most_speed, acted("speed"), at);
-    this.meters.tangential.set(steering.tangential, steering.least_tangential, steering.most_tangential, acted("tangential"), at);
+    this.meters.tangential.set(
+      steering.tangential,
+      steering.least_tangential,
+      steering.most_tangential,
+      acted("tangential"),
+      at,
+    );
     this.meters.lateral.set(Math.abs(steering.lateral), 0, steering.most_lateral, acted("lateral"), at);
     this.meters.jerk.set(steering.jerk, 0, steering.most_jerk, acted("jerk"), at);
     this.strips.speed.add(frame.time, speed, steering.least_speed, steering.most_speed, acted("speed"));
-    this.strips.tangential.add(frame.time, steering.tangential, steering.least_tangential, steering.most_tangential, acted("tangential"));
+    this.strips.tangential.add(
+      frame.time,
+      steering.tangential,
+      steering.least_tangential,
+      steering.most_tangential,
+      acted("tangential"),
+    );
     this.strips.lateral.add(frame.time, Math.abs(steering.lateral), 0, steering.most_lateral, acted("lateral"));
     this.graph.show(playing.group, steering.generic);
     this.readings.segment.set(String(playing.segment));
@@ -250,7 +290,8 @@ export class WalkMode implements Mode {
     if (this.echoPending && share > 0) {
       const took = performance.now() - this.echoPending;
       this.echoPending = 0;
-      if (took < 2000) this.page.latency = this.page.latency === null ? took : this.page.latency + (took - this.page.latency) * 0.1;
+      if (took < 2000)
+        this.page.latency = this.page.latency === null ? took : this.page.latency + (took - this.page.latency) * 0.1;
     }
     this.steering.tick(now);
     for (const trail of Object.values(this.trails)) trail.update();
@@ -316,7 +357,8 @@ export class WalkMode implements Mode {
     if (!controls) return;
     controls.motion.set(motion);
     const unlessHeld = (control: Control<number>, value: number): void => {
-      if (!control.element.contains(document.activeElement) || !control.element.matches(":active, :has(:active)")) control.set(value);
+      if (!control.element.contains(document.activeElement) || !control.element.matches(":active, :has(:active)"))
+        control.set(value);
     };
     unlessHeld(controls.speed, speed);
     unlessHeld(controls.turn, turn);
@@ -329,10 +371,19 @@ export class WalkMode implements Mode {
   private choose(changes: Partial<Settings>): void {
     const wanted: Partial<Settings> = { ...changes };
     // another motion brings its own speed along
-    if (wanted.motion && wanted.speed === undefined && wanted.motion !== "stand" && wanted.motion !== this.settings?.motion) {
+    if (
+      wanted.motion &&
+      wanted.speed === undefined &&
+      wanted.motion !== "stand" &&
+      wanted.motion !== this.settings?.motion
+    ) {
       wanted.speed = this.speeds[wanted.motion];
     }
-    if (wanted.speed !== undefined) wanted.speed = Math.min(Number(this.controls?.speed.element.querySelector("input")?.max ?? 12), Math.max(0.3, wanted.speed));
+    if (wanted.speed !== undefined)
+      wanted.speed = Math.min(
+        Number(this.controls?.speed.element.querySelector("input")?.max ?? 12),
+        Math.max(0.3, wanted.speed),
+      );
     if (this.settings) Object.assign(this.settings, wanted);
     if (this.settings && wanted.motion) this.controls?.motion.set(wanted.motion);
     if (wanted.speed !== undefined) {
@@ -347,11 +398,18 @@ export class WalkMode implements Mode {
     const { database, settings } = welcome;
     const top = Math.max(2, ...Object.values(database.top_speeds));
     const motionIcons = { stand: icons.stand, walk: icons.walk, run: icons.run };
-    const motions = (["stand", "walk", "run"] as const).filter((motion) => motion === "stand" || database.motions.includes(motion));
+    const motions = (["stand", "walk", "run"] as const).filter(
+      (motion) => motion === "stand" || database.motions.includes(motion),
+    );
     const controls = (this.controls = {
       motion: segmented<Motion>(
         "Motion",
-        motions.map((motion) => ({ value: motion, label: motion[0]!.toUpperCase() + motion.slice(1), icon: motionIcons[motion], title: `Key ${["stand", "walk", "run"].indexOf(motion) + 1}` })),
+        motions.map((motion) => ({
+          value: motion,
+          label: motion[0]!.toUpperCase() + motion.slice(1),
+          icon: motionIcons[motion],
+          title: `Key ${["stand", "walk", "run"].indexOf(motion) + 1}`,
+        })),
         settings.motion,
         (motion) => this.choose({ motion }),
       ),
@@ -379,7 +437,8 @@ export class WalkMode implements Mode {
         max: Math.min(1, Math.max(database.styles[1], 0.1)),
         step: 0.05,
         value: settings.style,
-        format: (value) => (Math.abs(value) < 0.15 ? "neutral" : `${value < 0 ? "gloomy" : "brisk"} ${Math.abs(value).toFixed(2)}`),
+        format: (value) =>
+          Math.abs(value) < 0.15 ? "neutral" : `${value < 0 ? "gloomy" : "brisk"} ${Math.abs(value).toFixed(2)}`,
         onInput: (style) => this.choose({ style }),
       }),
       size: select<Size>(
@@ -420,7 +479,15 @@ export class WalkMode implements Mode {
       this.trails[name].mesh.visible = on;
     };
     this.left.append(
-      section("Steer", {}, controls.motion.element, controls.speed.element, controls.turn.element, controls.style.element, controls.size.element),
+      section(
+        "Steer",
+        {},
+        controls.motion.element,
+        controls.speed.element,
+        controls.turn.element,
+        controls.style.element,
+        controls.size.element,
+      ),
       section(
         "See",
         {},
@@ -443,7 +510,11 @@ export class WalkMode implements Mode {
           "Drawn lines",
           [
             { value: "path", label: "Keep to it", title: "The line itself is walked, with the speed planned ahead" },
-            { value: "curve", label: "Follow a point", title: "A point runs along the line and is followed, as in the paper" },
+            {
+              value: "curve",
+              label: "Follow a point",
+              title: "A point runs along the line and is followed, as in the paper",
+            },
           ],
           "path",
           (kind) => (this.steering.exact = kind === "path"),
@@ -464,10 +535,18 @@ export class WalkMode implements Mode {
 
   private fillRight(): void {
     this.right.append(
-      section("Bounds that act", {}, el("ul", { class: "meters" }, ...Object.values(this.meters).map((meter) => meter.element))),
+      section(
+        "Bounds that act",
+        {},
+        el("ul", { class: "meters" }, ...Object.values(this.meters).map((meter) => meter.element)),
+      ),
       section("Against what was learned", {}, ...Object.values(this.strips).map((strip) => strip.element)),
       section("Playing now", {}, this.graph.element),
-      section("Pace", {}, el("dl", { class: "readings" }, ...Object.values(this.readings).map((reading) => reading.element))),
+      section(
+        "Pace",
+        {},
+        el("dl", { class: "readings" }, ...Object.values(this.readings).map((reading) => reading.element)),
+      ),
     );
   }
 }
