@@ -24,6 +24,7 @@ def open_socket(server: LiveServer, *, protocols: tuple[str, ...] = (PROTOCOL,),
         compression=None,
         max_size=None,
         proxy=None,
+        close_timeout=1,
         **options,
     )
 

@@ -1,4 +1,4 @@
-"""A live server with the database of people made of formulas, and clients of it."""
+"""A live server with the sample database, and clients of it."""
 
 from __future__ import annotations
 
@@ -9,12 +9,19 @@ import pytest
 from live_clients import Client, open_socket
 from stridecast.live.serve import LiveServer
 from stridecast.model.database import MotionDatabase
+from stridecast.samples.library import sample_database
+
+
+@pytest.fixture(scope="session")
+def learned() -> MotionDatabase:
+    """The sample database."""
+    return sample_database()
 
 
 @pytest.fixture(scope="module")
-def server(formula_database: MotionDatabase) -> Iterator[LiveServer]:
+def server(learned: MotionDatabase) -> Iterator[LiveServer]:
     """A server on a free port."""
-    with LiveServer(formula_database, "formulas", port=0, most_sessions=4).running() as running:
+    with LiveServer(learned, port=0, most_sessions=4).running() as running:
         yield running
 
 

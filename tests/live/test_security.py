@@ -128,8 +128,8 @@ def test_no_path_of_the_client_is_opened(server, path):
     assert ask(server, path)[0].status in (400, 404)
 
 
-def test_without_the_bundle_the_page_says_how_to_build_it(formula_database, tmp_path):
-    server = LiveServer(formula_database, port=0)
+def test_without_the_bundle_the_page_says_how_to_build_it(learned, tmp_path):
+    server = LiveServer(learned, port=0)
     server.hall.bundle = tmp_path
     with server.running():
         answer, data = ask(server)
@@ -158,9 +158,9 @@ def test_the_own_page_can(server):
 
 
 @pytest.fixture(scope="module")
-def open_server(formula_database):
+def open_server(learned):
     """A server that others could reach; only this machine does."""
-    with LiveServer(formula_database, host="0.0.0.0", port=0).running() as running:
+    with LiveServer(learned, host="0.0.0.0", port=0).running() as running:
         yield running
 
 
@@ -202,14 +202,14 @@ def test_the_token_does_not_open_for_other_pages(open_server):
     assert ask(open_server, path, host=f"evil.example:{open_server.port}")[0].status == 403
 
 
-def test_two_servers_have_two_tokens(formula_database, open_server):
-    other = LiveServer(formula_database, host="0.0.0.0", port=0)
+def test_two_servers_have_two_tokens(learned, open_server):
+    other = LiveServer(learned, host="0.0.0.0", port=0)
     assert other.token != open_server.token
     other.close()
 
 
-def test_a_place_that_is_taken_is_refused(formula_database, server):
+def test_a_place_that_is_taken_is_refused(learned, server):
     with pytest.raises(InputError, match=f"cannot listen at 127.0.0.1, port {server.port}"):
-        LiveServer(formula_database, port=server.port)
+        LiveServer(learned, port=server.port)
     with pytest.raises(InputError, match="cannot listen at 203"):
-        LiveServer(formula_database, host="203.0.113.77")
+        LiveServer(learned, host="203.0.113.77")

@@ -168,6 +168,7 @@ class ScenePlay:
                 self._begin(self._made(self.crowd.scene))
         self._stale = True
         self.tell_player()
+        self.explain()
 
     def scrub(self, time: float) -> None:
         """Pause, and show what was at a time.
@@ -241,6 +242,7 @@ class ScenePlay:
         elif self.done:
             self.playing = False
             self.tell_player()
+            self.explain()
         else:
             crowd.step(focus=self.view.center)
             self._keep(crowd)
