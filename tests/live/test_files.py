@@ -97,7 +97,7 @@ def test_files_are_bounded_in_size_and_number(tmp_path):
     def save(name, count):
         return asyncio.run(uploads.save(name, chunks(count)))
 
-    with pytest.raises(UploadRefusedError, match="a.bvh is larger than 0.38147 MB"):
+    with pytest.raises(UploadRefusedError, match=r"a\.bvh is larger than 0\.38147 MB"):
         save("a.bvh", 401)
     with pytest.raises(UploadRefusedError, match="is empty"):
         save("a.bvh", 0)

@@ -16,8 +16,8 @@ counts = st.integers(0, 7)
 
 
 @st.composite
-def quaternions(draw, shape=st.integers(1, 40)):
-    raw = draw(hnp.arrays(np.float64, (draw(shape), 4), elements=st.floats(-1, 1)))
+def quaternions(draw):
+    raw = draw(hnp.arrays(np.float64, (draw(st.integers(1, 40)), 4), elements=st.floats(-1, 1)))
     length = np.linalg.norm(raw, axis=-1, keepdims=True)
     return np.where(length > 1e-3, raw / np.maximum(length, 1e-3), np.array([1.0, 0.0, 0.0, 0.0]))
 

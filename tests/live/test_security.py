@@ -122,7 +122,8 @@ def test_unknown_addresses_and_methods_are_told(server):
 
 
 @pytest.mark.parametrize(
-    "path", ["/assets/../hall.py", "/assets/%2e%2e/hall.py", "/assets/..%2f..%2fhall.py", "/download/..%2f..%2fx", "/%00"]
+    "path",
+    ["/assets/../hall.py", "/assets/%2e%2e/hall.py", "/assets/..%2f..%2fhall.py", "/download/..%2f..%2fx", "/%00"],
 )
 def test_no_path_of_the_client_is_opened(server, path):
     assert ask(server, path)[0].status in (400, 404)
