@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import time
 from typing import Any
 
@@ -27,6 +28,14 @@ def open_socket(server: LiveServer, *, protocols: tuple[str, ...] = (PROTOCOL,),
         close_timeout=1,
         **options,
     )
+
+
+def open_narrow_socket(server: LiveServer, room: int = 16_384, **options: Any):
+    """Connect so that the system keeps little for a client that does not read."""
+    narrow = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    narrow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, room)
+    narrow.connect(("127.0.0.1", server.port))
+    return open_socket(server, sock=narrow, **options)
 
 
 class Client:

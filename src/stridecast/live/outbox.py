@@ -34,8 +34,9 @@ class Outbox:
         """Send a message when its turn comes."""
         text = message.model_dump_json()
         with self._lock:
-            self._messages.append(text)
-            self.overflown |= len(self._messages) > MOST_WAITING
+            self.overflown |= len(self._messages) >= MOST_WAITING
+            if not self.overflown:
+                self._messages.append(text)
         self._wake()
 
     def show(self, frame: bytes) -> None:

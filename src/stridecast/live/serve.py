@@ -28,6 +28,9 @@ OWN = "127.0.0.1"
 PORT = 8047
 """The usual port; where it is taken, the system gives another."""
 
+MOST_CONNECTIONS = 100
+"""So many are open at once, of all kinds; more are answered with status 503."""
+
 SEND_BUFFER = 256 * 1024
 """What a slow client has not taken waits in the system up to so many bytes; else frames of seconds would."""
 
@@ -91,6 +94,7 @@ class LiveServer:
             server_header=False,
             h11_max_incomplete_event_size=64 * 1024,
             timeout_keep_alive=15,
+            limit_concurrency=MOST_CONNECTIONS,
             timeout_graceful_shutdown=3,
         )
         self._server = uvicorn.Server(config)

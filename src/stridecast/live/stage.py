@@ -92,7 +92,9 @@ class Stage(threading.Thread):
 
     def run(self) -> None:
         """Play until stopped."""
-        self._use(self.hall.database, self.hall.name, built=False)
+        self._guarded("database", lambda: self._use(self.hall.database, self.hall.name, built=False))
+        if not hasattr(self, "walking"):  # the error has been told; there is nothing to be played with
+            return
         told = time.monotonic()
         while not self._stopped.is_set():
             for message in self._come(min(self._pacer.wait(time.monotonic()), IDLE)):
@@ -109,10 +111,10 @@ class Stage(threading.Thread):
                 self._tell_health()
 
     def _use(self, database: MotionDatabase, name: str, *, built: bool) -> None:
-        """Begin anew with a database."""
+        """Begin anew with a database; where nobody can walk with it, nothing has changed."""
         tell = self.outbox.tell
-        self.database, self.name = database, name
-        self.walking = Walking(database, tell)
+        walking = Walking(database, tell)
+        self.database, self.name, self.walking = database, name, walking
         self.scene = ScenePlay(
             database,
             tell,
