@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -58,6 +59,16 @@ def mocap() -> Path:
     if not folder.is_dir():
         absent("mocap", f"no recordings in {folder} (STRIDECAST_MOCAP names another folder)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Path:
+    """The browser in which the page is tested: ``STRIDECAST_CHROMIUM``, or what is called chromium here."""
+    named = os.environ.get("STRIDECAST_CHROMIUM")
+    found = named or shutil.which("chromium") or shutil.which("chromium-browser")
+    if not found:
+        absent("chromium", "no chromium on this machine (STRIDECAST_CHROMIUM names another browser)")
+    return Path(str(found))
 
 
 @pytest.fixture

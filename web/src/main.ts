@@ -17,7 +17,7 @@ import { Messages } from "./ui/messages";
 import { pictureOptions, type PictureOptions } from "./ui/options";
 import { Shell } from "./ui/shell";
 
-/** `?ratio=0.5&shadows=0&smooth=0&poses=40` in the address: for slow machines and tests. */
+/** `?ratio=0.5&shadows=0&smooth=0&poses=40&pictures=10` (a second) in the address: for slow machines and tests. */
 function firstOptions(): PictureOptions {
   const asked = new URLSearchParams(location.search);
   const number = (name: string, otherwise: number): number => {
@@ -28,6 +28,7 @@ function firstOptions(): PictureOptions {
     sharpness: Math.min(2, Math.max(0.2, number("ratio", 2))),
     shadows: number("shadows", 1) !== 0,
     smooth: number("smooth", 1) !== 0,
+    spacing: asked.has("pictures") ? 1000 / Math.max(1, number("pictures", 60)) : 0,
     poses: Math.min(160, Math.max(0, number("poses", 120))),
   };
 }
@@ -40,7 +41,7 @@ function begin(): void {
   const messages = new Messages();
   let stage: Stage;
   try {
-    stage = new Stage({ ratio: picture.sharpness, shadows: picture.shadows });
+    stage = new Stage({ ratio: picture.sharpness, shadows: picture.shadows, spacing: picture.spacing });
   } catch {
     messages.error("This browser draws no WebGL 2. Switch hardware or software WebGL on, or take another browser.");
     document.body.append(messages.element);

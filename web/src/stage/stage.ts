@@ -26,6 +26,8 @@ export interface StageOptions {
   /** Greatest ratio of drawn to shown pixels. */
   ratio: number;
   shadows: boolean;
+  /** Least time between two pictures, milliseconds; 0 draws as often as the screen shows. */
+  spacing: number;
 }
 
 /** A ground point. */
@@ -64,7 +66,11 @@ export class Stage {
       "aria-label": "Stage. Keys: see the help, question mark.",
     });
     this.element = el("div", { class: "stage-frame" }, this.canvas);
-    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer = new WebGLRenderer({
+      canvas: this.canvas,
+      antialias: options.ratio >= 1,
+      powerPreference: "high-performance",
+    });
     this.renderer.toneMapping = NeutralToneMapping;
     this.renderer.toneMappingExposure = 1.0;
     this.renderer.shadowMap.enabled = options.shadows;
@@ -157,6 +163,7 @@ export class Stage {
   }
 
   private draw(now: number): void {
+    if (now - this.last < this.options.spacing) return;
     const seconds = Math.min(0.1, Math.max(0, (now - this.last) / 1000));
     this.frameTime += (Math.min(1, (now - this.last) / 1000) - this.frameTime) * 0.08;
     this.last = now;

@@ -10,6 +10,7 @@ export interface PictureOptions {
   shadows: boolean;
   smooth: boolean;
   poses: number;
+  spacing: number;
 }
 
 /** The folded panel of the picture's options. */

@@ -150,8 +150,13 @@ export class Uploading {
           body: file,
           headers: { "Content-Type": "application/octet-stream" },
         });
-        const said = (await answer.json()) as { error?: string };
+        const said = (await answer.json()) as {
+          error?: string;
+          files?: string[];
+          bytes?: number;
+        };
         if (!answer.ok) messages.error(said.error ?? `The server did not take ${file.name}.`);
+        else this.have(said.files ?? [], said.bytes ?? 0);
       } catch {
         messages.error(`${file.name} did not reach the server. Drop it again when the connection is back.`);
         break;

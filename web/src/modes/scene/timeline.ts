@@ -98,7 +98,8 @@ export class Timeline {
     this.fill();
     setText(this.clock, `${state.time.toFixed(1)} s`);
     this.line.setAttribute("aria-valuetext", `${state.time.toFixed(1)} seconds`);
-    const parts = state.mode === "scene" && (state.came || state.there) ? [`${state.there} there`, `${state.arrived} arrived`] : [];
+    const parts =
+      state.mode === "scene" && (state.came || state.there) ? [`${state.there} there`, `${state.arrived} arrived`] : [];
     if (state.waiting) parts.push(`${state.waiting} waiting`);
     if (state.turned_away) parts.push(`${state.turned_away} without a way`);
     if (state.done && state.mode === "scene") parts.push("done");

@@ -433,8 +433,8 @@ export class WalkMode implements Mode {
       }),
       style: slider({
         label: "Mood",
-        min: Math.max(-1, Math.min(database.styles[0], -0.1)),
-        max: Math.min(1, Math.max(database.styles[1], 0.1)),
+        min: Math.max(-1, Math.floor(Math.min(database.styles[0], -0.1) * 20) / 20),
+        max: Math.min(1, Math.ceil(Math.max(database.styles[1], 0.1) * 20) / 20),
         step: 0.05,
         value: settings.style,
         format: (value) =>
