@@ -73,7 +73,7 @@ class Stage(threading.Thread):
         self._building: Building | None = None
         self._build_request = 0
         self._built: MotionDatabase | None = None
-        self._exporting: threading.Thread | None = None
+        self._exporting = False
 
     def put(self, message: object) -> bool:
         """Hand over a message; False where too many wait."""
@@ -314,7 +314,7 @@ class Stage(threading.Thread):
 
     def _export(self, message: say.ExportMessage) -> None:
         """Make a file of what was played in the mode that is on, while everything else goes on."""
-        if self._exporting is not None and self._exporting.is_alive():
+        if self._exporting:
             raise InputError("another file is being made; wait for it")
         write: Callable[[Path], None]
         if message.what == "database":
@@ -334,18 +334,19 @@ class Stage(threading.Thread):
             name, write = "crowd.csv", lambda path: write_ways(path, frames)
         else:
             name, write = "crowd.zip", self._write_crowd()
-        self._exporting = threading.Thread(
-            target=lambda: self._guarded("export", lambda: self._make(name, write, message.request), message.request),
-            daemon=True,
-        )
-        self._exporting.start()
+        make = lambda: self._make(name, write, message.request)  # noqa: E731
+        self._exporting = True
+        threading.Thread(target=lambda: self._guarded("export", make, message.request), daemon=True).start()
 
     def _make(self, name: str, write: Callable[[Path], None], request: int) -> None:
         """Make a file, in a thread of its own."""
         downloads = self.guest.downloads
-        path = downloads.place(name)
-        write(path)
-        url = downloads.offer(path, name)
+        try:
+            path = downloads.place(name)
+            write(path)
+            url = downloads.offer(path, name)
+        finally:
+            self._exporting = False
         self.outbox.tell(say.ExportReady(request=request, url=url, name=name, bytes=path.stat().st_size))
 
     def _write_clip(self, what: str) -> Callable[[Path], None]:
