@@ -302,6 +302,18 @@ def test_somebody_is_explained(player):
     assert 0.2 < np.hypot(*(ahead[-1] - ahead[0])) < 3.0  # the room to stop
 
 
+def test_of_what_is_shown_again_only_the_rule_is_known(player):
+    player.scene(people(2))
+    player.play.ask(1)
+    player.act("play")
+    player.run(60)
+    player.play.scrub(1.0)
+    told = player.told("explanation")[-1]
+    assert (told.name, told.gone, told.rule, told.path, told.window) == ("person 1", False, "on the way", [], [])
+    player.play.scrub(99.0)
+    assert player.told("explanation")[-1].path
+
+
 def test_who_has_left_is_said_to_be_gone(player):
     player.scene({"people": [{"start": [0, 0], "goals": [[0, 3]]}, {"start": [5, 0]}]})
     player.play.ask(1)

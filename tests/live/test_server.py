@@ -173,6 +173,7 @@ def test_what_was_walked_is_saved(client, server):
         ('{"type": "wish", "wish": {"kind": "point", "point": [1e400, 0]}}', "message", "finite"),
         ('{"type": "settings", "motion": "fly"}', "message", "motion"),
         ('{"type": "wish", "wish": {"kind": "path", "points": [[0, 0], [0, 0.01]]}}', "wish", "draw at least"),
+        ('{"type": "wish", "wish": {"kind": "curve", "points": [[0, 0], [0, 2000]]}}', "wish", "1000 m are the most"),
         ('{"type": "playback", "action": "play", "more": 1}', "message", "more"),
         ('{"type": "use", "database": "built", "request": 4}', "database", "no database has been built"),
         ('{"type": "build", "request": 4}', "build", "no recording has been uploaded"),

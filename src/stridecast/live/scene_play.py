@@ -10,6 +10,7 @@ from jaxtyping import Int
 
 from stridecast.crowd.crowd import Crowd
 from stridecast.crowd.frame import CrowdFrame
+from stridecast.crowd.rules import RULES
 from stridecast.crowd.step_kernels import propose
 from stridecast.errors import InputError
 from stridecast.geometry.kernels import is_compiled
@@ -184,6 +185,7 @@ class ScenePlay:
         time = min(max(time, self.timeline.first), self.timeline.last)
         self._cursor = None if time >= self.timeline.last else time
         self.tell_player()
+        self.explain()
 
     def look(self, view: ViewMessage) -> None:
         """Show what is near to another place."""
@@ -344,6 +346,9 @@ class ScenePlay:
         number, crowd = self.asked, self.crowd
         if number is None or crowd is None:
             return
+        if self._cursor is not None:
+            self._recall(crowd, number, self._cursor)
+            return
         try:
             told, ahead = crowd.explain(number), crowd.outlook(number)
         except InputError:
@@ -368,6 +373,14 @@ class ScenePlay:
                 target=_points(ahead.target[None])[0],
             )
         )
+
+    def _recall(self, crowd: Crowd, number: int, time: float) -> None:
+        """Say what somebody was up to at an earlier time; why, nobody remembers."""
+        _, figures = self.timeline.at(time)
+        rows = np.flatnonzero(figures.ids == number)
+        name = crowd.person(number).name if number <= len(crowd.came) else ""
+        rule = RULES[int(figures.rules[rows[0]])] if len(rows) else ""
+        self._tell(ExplanationMessage(person=number, name=name, gone=not len(rows), rule=rule))
 
 
 def figures_of(frame: CrowdFrame) -> Figures:

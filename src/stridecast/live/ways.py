@@ -25,8 +25,8 @@ RADIUS = 0.5
 AHEAD = 0.8
 """The point waits when it is further ahead than the walker is used to keep behind, and this, metres."""
 
-SHORTEST = 0.3
-"""A shorter line is no way, metres."""
+SHORTEST, LONGEST = 0.3, 1000.0
+"""A shorter line is no way, and a longer one is a mistake, metres."""
 
 
 def way_of(
@@ -44,7 +44,7 @@ def way_of(
     Raises
     ------
     PathError
-        It is too short.
+        It is too short or too long.
     """
     points = np.array(drawn, np.float64)
     kept = [points[0]]
@@ -57,6 +57,8 @@ def way_of(
     length = float(np.linalg.norm(np.diff(np.concatenate((position[None], line)), axis=0), axis=-1).sum())
     if length < SHORTEST:
         raise PathError(f"the line is {length:.2f} m long from where the walker is; draw at least {SHORTEST} m")
+    if length > LONGEST:
+        raise PathError(f"the line is {length:.0f} m long; {LONGEST:.0f} m are the most")
     arc = _arc(position, heading, line[0])
     outside = np.hypot(*(line - arc[-1]).T) > SPACING
     first = int(np.argmax(outside)) if outside.any() else len(line) - 1
