@@ -11,6 +11,7 @@ from stridecast.errors import DatabaseError, InputError, WishError
 from stridecast.geometry import ground
 from stridecast.model.pose import Pose
 from stridecast.steering.force import SteeringGains
+from stridecast.synthesis.sizes import enlargement
 from stridecast.synthesis.walker import Walker, Walkers
 from stridecast.synthesis.wishes import FARTHEST
 from walks import motions_of, points_of
@@ -362,3 +363,11 @@ def test_gains_are_changed_while_walking(formulas):
             pose = walker.step((0.0, 0.04 * frame))
         far.append(0.04 * 89 - pose.vehicle.position[1])
     assert far[0] < far[1]
+
+
+def test_what_larger_movements_add_is_worked_out_once(formulas):
+    first, other = Walker(formulas, size="lively"), Walker(formulas)
+    for walker in (first, other):
+        walker.step((0.0, 1.0), size="exaggerated")
+    assert first._batch._tables.larger is other._batch._tables.larger
+    assert np.allclose(first._batch._tables.larger, enlargement(formulas), atol=1e-5)

@@ -20,6 +20,7 @@ from stridecast.live.limits import usual_limits
 from stridecast.live.messages import LARGEST_MESSAGE, LimitsPart
 from stridecast.live.security import Rules
 from stridecast.model.database import MotionDatabase
+from stridecast.synthesis.sizes import kept_enlargement
 from stridecast.synthesis.walker import Walker
 
 OWN = "127.0.0.1"
@@ -117,6 +118,7 @@ class LiveServer:
         Walker(self.hall.database).step(
             (0.0, 0.0), motion=self.hall.database.motions[0]
         )  # compiled before anybody waits
+        threading.Thread(target=kept_enlargement, args=(self.hall.database,), daemon=True).start()
         if ready is not None:
             threading.Thread(target=self._when_started, args=(ready,), daemon=True).start()
         try:

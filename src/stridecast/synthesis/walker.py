@@ -17,7 +17,7 @@ from stridecast.model.pose import BoundsInForce, Pose, VehicleState
 from stridecast.model.segment import MOTIONS
 from stridecast.steering.force import SteeringGains
 from stridecast.steering.kernels import JERK, LATERAL, SPEED, TANGENTIAL
-from stridecast.synthesis.sizes import enlargement
+from stridecast.synthesis.sizes import kept_enlargement
 from stridecast.synthesis.state import make_state
 from stridecast.synthesis.step_kernels import GIVEN, PLAN, POINT, Given, step_block
 from stridecast.synthesis.styles import Style, style_numbers
@@ -307,7 +307,7 @@ class Walkers:
 
     def _enlarge_if(self, sizes: list[float]) -> None:
         if any(sizes) and not len(self._tables.larger):
-            self._tables = self._tables._replace(larger=enlargement(self.database).astype(np.float32))
+            self._tables = self._tables._replace(larger=kept_enlargement(self.database))
 
     def _advance(self) -> None:
         if not step_block.signatures and not is_compiled(step_block):
