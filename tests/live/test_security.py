@@ -9,7 +9,7 @@ from websockets.exceptions import InvalidStatus
 
 from live_clients import Client, open_socket
 from stridecast.errors import InputError
-from stridecast.live.security import COOKIE, Rules, content_policy
+from stridecast.live.security import CLOSED, COOKIE, Rules, content_policy
 from stridecast.live.serve import LiveServer
 
 
@@ -74,6 +74,7 @@ def test_a_foreign_name_is_refused(server):
     """DNS rebinding: a page of evil.example whose name was made to point at this machine."""
     answer, data = ask(server, host=f"evil.example:{server.port}")
     assert answer.status == 403
+    assert answer.headers["content-security-policy"] == CLOSED
     assert "use the address it printed" in json.loads(data)["error"]
 
 
@@ -178,8 +179,10 @@ def test_other_places_need_the_token(open_server):
 
 
 def test_the_token_opens_once_as_a_cookie(open_server):
-    answer, _ = ask(open_server, f"/?token={open_server.token}")
-    assert (answer.status, answer.headers["location"]) == (303, "/")
+    answer, data = ask(open_server, f"/?token={open_server.token}")
+    assert answer.status == 200
+    assert b'content="0; url=/"' in data
+    assert open_server.token.encode() not in data
     cookie = answer.headers["set-cookie"]
     assert "HttpOnly" in cookie
     assert "SameSite=strict" in cookie

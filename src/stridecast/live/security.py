@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
-from starlette.responses import JSONResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 COOKIE = "stridecast"
@@ -22,6 +22,13 @@ COOKIE = "stridecast"
 
 OWN_NAMES = ("localhost", "127.0.0.1", "::1")
 """By which a server on this machine may be called."""
+
+
+CLOSED = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+"""Policy of what is no part of the page."""
+
+_ONWARD = '<!doctype html><meta charset="utf-8"><meta http-equiv="refresh" content="0; url=/"><title>stridecast</title>'
+"""Leads on to the page from here: after a redirect that another site began, a strict cookie would not be sent."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,20 +73,19 @@ class Guard:
             return
         headers = _headers(scope["headers"])
         answer = self._refusal(scope, headers)
+        policy = CLOSED if answer is not None else content_policy(headers["host"][0])
+
+        async def sending(message: Message) -> None:
+            if message["type"] in ("http.response.start", "websocket.http.response.start"):
+                message["headers"] = [*message["headers"], *_answer_headers(policy)]
+            await send(message)
+
         if answer is None:
-            host = headers["host"][0]
-
-            async def sending(message: Message) -> None:
-                if message["type"] == "http.response.start":
-                    message["headers"] = [*message["headers"], *_answer_headers(host)]
-                await send(message)
-
-            await self.app(scope, receive, sending if scope["type"] == "http" else send)
-            return
-        if scope["type"] == "http":
-            await answer(scope, receive, send)
+            await self.app(scope, receive, sending)
+        elif scope["type"] == "http":
+            await answer(scope, receive, sending)
         else:
-            await _deny(answer, send)
+            await _deny(answer, sending)
 
     def _refusal(self, scope: Scope, headers: dict[str, list[str]]) -> Response | None:
         hosts, origins = headers.get("host", []), headers.get("origin", [])
@@ -96,7 +102,7 @@ class Guard:
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
         cookie = f"{COOKIE}_{self.rules.port}"
         if given and scope["type"] == "http" and scope["path"] == "/" and self._is_token(given):
-            answer: Response = RedirectResponse("/", status_code=303)
+            answer: Response = HTMLResponse(_ONWARD, headers={"cache-control": "no-store"})
             answer.set_cookie(cookie, self.rules.token, httponly=True, samesite="strict")
             return answer
         bearer = [h.removeprefix("Bearer ") for h in headers.get("authorization", []) if h.startswith("Bearer ")]
@@ -120,9 +126,9 @@ def content_policy(host: str) -> str:
     )
 
 
-def _answer_headers(host: str) -> list[tuple[bytes, bytes]]:
+def _answer_headers(policy: str) -> list[tuple[bytes, bytes]]:
     named = {
-        "content-security-policy": content_policy(host),
+        "content-security-policy": policy,
         "x-content-type-options": "nosniff",
         "x-frame-options": "DENY",
         "referrer-policy": "no-referrer",
