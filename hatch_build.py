@@ -28,7 +28,7 @@ class PageHook(BuildHookInterface):  # type: ignore[type-arg, misc]
         bundle = _bundle()
         return [] if bundle.ready() or bundle.find_node() else [bundle.WHEEL]
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
         """Make the bundle unless it is there."""
         bundle = _bundle()
         try:

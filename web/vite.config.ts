@@ -24,10 +24,10 @@ export default defineConfig({
   },
   server: {
     proxy: {
-      "/ws": { target: "ws://127.0.0.1:8765", ws: true },
-      "/body.glb": "http://127.0.0.1:8765",
-      "/files": "http://127.0.0.1:8765",
-      "/download": "http://127.0.0.1:8765",
+      "/ws": { target: "ws://127.0.0.1:8047", ws: true },
+      "/body.glb": "http://127.0.0.1:8047",
+      "/files": "http://127.0.0.1:8047",
+      "/download": "http://127.0.0.1:8047",
     },
   },
   test: { include: ["tests/**/*.test.ts"], environment: "node" },

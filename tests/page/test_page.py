@@ -28,7 +28,7 @@ def test_the_bundle_is_small_and_names_no_other_host() -> None:
 def test_text_can_be_read() -> None:
     """Contrasts of the style sheet's colours of text and grounds."""
     css = (ROOT / "web" / "src" / "ui" / "style.css").read_text(encoding="utf-8")
-    colours = {name: value for name, value in re.findall(r"--([\w-]+): (#[0-9a-f]{3,6});", css)}
+    colours = dict(re.findall(r"--([\w-]+): (#[0-9a-f]{3,6});", css))
 
     def light(colour: str) -> float:
         digits = colour[1:] if len(colour) == 7 else "".join(2 * c for c in colour[1:])
@@ -90,7 +90,9 @@ def test_nonsense_harms_nobody(visitor: Visitor, nonsense: str) -> None:
             const socket = new WebSocket(`ws://${{location.host}}/ws`, "stridecast.1");
             let told = false;
             socket.onopen = () => socket.send({nonsense});
-            socket.onmessage = ({{ data }}) => typeof data === "string" && JSON.parse(data).type === "error" && done(told = true);
+            socket.onmessage = ({{ data }}) => {{
+                if (typeof data === "string" && JSON.parse(data).type === "error") done(told = true);
+            }};
             socket.onclose = () => done(told = true);
         }})"""
     )

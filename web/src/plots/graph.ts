@@ -21,7 +21,7 @@ export class GraphDrawing {
     role: "img",
     "aria-label": "Transition graph",
   });
-  private readonly caption = el("p", { class: "graph-caption" });
+  readonly caption = el("p", { class: "graph-caption" });
   private nodes: Node[] = [];
   private edges = new Map<string, SVGElement>();
   private names: string[] = [];
@@ -30,7 +30,7 @@ export class GraphDrawing {
   private ring = svg("circle", { r: 8.5, class: "graph-ring", pathLength: 1 });
 
   constructor() {
-    this.element = el("figure", { class: "graph-figure" }, this.picture as unknown as HTMLElement, this.caption);
+    this.element = el("figure", { class: "graph-figure" }, this.picture);
   }
 
   set(database: DatabasePart): void {

@@ -35,7 +35,7 @@ export class Strip {
     this.plot = new uPlot(
       {
         width: 256,
-        height: 62,
+        height: 56,
         padding: [4, 2, 0, 0],
         cursor: { show: false },
         legend: { show: false },
@@ -78,7 +78,7 @@ export class Strip {
     );
     new ResizeObserver(() => {
       const width = holder.clientWidth;
-      if (width > 0) this.plot.setSize({ width, height: 62 });
+      if (width > 0) this.plot.setSize({ width, height: 56 });
     }).observe(holder);
   }
 

@@ -43,6 +43,11 @@ export class Cameras {
     if (this.view !== "orbit") this.wanted.set(x, y, z);
   }
 
+  /** The orbit view rests until somebody has gone too far off; then it looks there. */
+  keepNear(x: number, z: number, metres: number): void {
+    if (this.view === "orbit" && Math.hypot(x - this.wanted.x, z - this.wanted.z) > metres) this.wanted.set(x, 0.85, z);
+  }
+
   /** Look at a place from now on. */
   lookAt(x: number, z: number, distance?: number): void {
     this.wanted.set(x, 0.5, z);

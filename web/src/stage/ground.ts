@@ -10,7 +10,7 @@ export class Ground {
   private readonly shadow: Mesh;
 
   constructor(scene: Scene) {
-    const material = new MeshLambertMaterial({ color: palette.ground });
+    const material = new MeshLambertMaterial({ color: palette.ground, depthWrite: false }); // nothing lies below it
     material.onBeforeCompile = (shader) => {
       shader.uniforms.fineLine = { value: new Color(palette.gridFine) };
       shader.uniforms.coarseLine = { value: new Color(palette.gridCoarse) };
@@ -32,7 +32,7 @@ export class Ground {
             vec2 change = fwidth(cell);
             vec2 near = abs(fract(cell - 0.5) - 0.5) / change;
             float line = 1.0 - clamp(min(near.x, near.y) - width + 0.5, 0.0, 1.0);
-            return line * (1.0 - smoothstep(0.12, 0.5, max(change.x, change.y)));
+            return line * (1.0 - smoothstep(0.03, 0.2, max(change.x, change.y)));
           }`,
         )
         .replace(

@@ -164,7 +164,7 @@ export class Stage {
 
   private draw(now: number): void {
     if (now - this.last < this.options.spacing) return;
-    const seconds = Math.min(0.1, Math.max(0, (now - this.last) / 1000));
+    const seconds = Math.min(0.5, Math.max(0, (now - this.last) / 1000));
     this.frameTime += (Math.min(1, (now - this.last) / 1000) - this.frameTime) * 0.08;
     this.last = now;
     for (const tick of this.ticks) tick(seconds, now);

@@ -61,6 +61,8 @@ export class DatabaseMode implements Mode {
   private readonly uploading: Uploading;
   private readonly filters = el("div");
   private readonly asking = el("div");
+  private lastTime = 0;
+  private begins = true;
   private turning: { x: number; y: number; id: number } | null = null;
 
   constructor(private readonly page: Page) {
@@ -166,11 +168,12 @@ export class DatabaseMode implements Mode {
   private words(example: number): string {
     const columns = this.state!.examples;
     const group = this.welcomed!.database.groups[columns.group[example]!];
-    return `${group?.name ?? ""} · ${columns.speed[example]!.toFixed(2)} m/s · ${columns.turn[example]!.toFixed(2)} rad/s`;
+    return `${group?.name ?? ""} · ${columns.speed[example]!.toFixed(2)} m/s · ${plain(columns.turn[example]!)} rad/s`;
   }
 
   private play(example: number): void {
     this.chosen = example;
+    this.begins = true;
     this.page.between.clear();
     this.page.connection.send({ type: "clip", example, request: this.page.connection.nextRequest() });
     this.drawRows();
@@ -186,7 +189,7 @@ export class DatabaseMode implements Mode {
         "p",
         {},
         el("strong", {}, clip.status.replace("-", " to ")),
-        ` ${clip.speed.toFixed(2)} m/s, turning ${clip.turn.toFixed(2)} rad/s, mood ${clip.style.toFixed(2)}, ${clip.seconds.toFixed(1)} s`,
+        ` ${clip.speed.toFixed(2)} m/s, turning ${plain(clip.turn)} rad/s, mood ${plain(clip.style)}, ${clip.seconds.toFixed(1)} s`,
       ),
       el(
         "p",
@@ -201,8 +204,9 @@ export class DatabaseMode implements Mode {
     this.page.connection.send({ type: "playback", action: "play" });
   }
 
-  frame(_frame: Frame): void {
-    // drawn in `tick`, between frames
+  frame(frame: Frame): void {
+    if (frame.time < this.lastTime) this.begins = true; // the clip begins again, and the camera is there at once
+    this.lastTime = frame.time;
   }
 
   tick(_seconds: number, now: number): void {
@@ -231,6 +235,8 @@ export class DatabaseMode implements Mode {
       [0, 0] as [number, number],
     );
     stage.cameras.follow(middle[0], 0.8, middle[1]);
+    if (this.begins) stage.cameras.jump();
+    this.begins = false;
   }
 
   key(event: KeyboardEvent): boolean {
@@ -351,7 +357,7 @@ export class DatabaseMode implements Mode {
           },
           el("td", {}, swatch, group?.name ?? ""),
           ...[columns.speed[i]!, columns.turn[i]!, columns.style[i]!, columns.seconds[i]!].map((value) =>
-            el("td", { class: "figure" }, value.toFixed(2)),
+            el("td", { class: "figure" }, plain(value)),
           ),
           el(
             "td",
@@ -513,3 +519,6 @@ export class DatabaseMode implements Mode {
     this.drawRows();
   }
 }
+
+/** Two decimals, and no minus before nought. */
+const plain = (value: number): string => (Math.abs(value) < 0.005 ? 0 : value).toFixed(2);

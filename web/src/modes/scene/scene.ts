@@ -307,7 +307,9 @@ export class SceneMode implements Mode {
         return el("li", {}, item);
       }),
     );
-    if (focused) (this.list.querySelector("[aria-pressed=true]") as HTMLElement | null)?.focus();
+    const first = this.list.querySelector<HTMLElement>("[aria-pressed=true]");
+    if (focused) first?.focus();
+    first?.scrollIntoView({ block: "nearest" });
   }
 
   // frames and pictures

@@ -21,7 +21,7 @@ export type Tool = "select" | "road" | "circle" | "polygon" | "wall" | "person" 
 
 export const HINTS: Record<Tool, string> = {
   select:
-    "Click to choose, shift-click for more, drag to move. Drag the ground to shift the view, drag with the right button to turn it.",
+    "Click to choose, shift-click for more, drag to move. Drag the ground to shift the view, right drag to turn it.",
   road: "Click point after point, double-click or press Enter to end the road. Or drag from one end to the other.",
   circle: "Press where the middle is to be, and drag to the rim.",
   polygon: "Click the corners one after the other, double-click or press Enter to close.",

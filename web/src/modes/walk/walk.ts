@@ -112,7 +112,7 @@ export class WalkMode implements Mode {
   private readonly readings = {
     segment: new Reading("Segment", "How many segments have begun"),
     picture: new Reading("Picture", "Time between pictures"),
-    latency: new Reading("Input to picture", "From a sample of the input to the first picture that shows its effect"),
+    latency: new Reading("Latency", "From a sample of the input to the first picture that shows its effect"),
     step: new Reading("Step", "Mean time of a step on the server"),
   };
   private stepMs: number | null = null;
@@ -286,6 +286,7 @@ export class WalkMode implements Mode {
         stage.camera.position,
       );
       stage.cameras.follow(between.places[0]!, 0.85, between.places[1]!);
+      stage.cameras.keepNear(between.places[0]!, between.places[1]!, 6);
     }
     if (this.echoPending && share > 0) {
       const took = performance.now() - this.echoPending;
@@ -541,11 +542,11 @@ export class WalkMode implements Mode {
         el("ul", { class: "meters" }, ...Object.values(this.meters).map((meter) => meter.element)),
       ),
       section("Against what was learned", {}, ...Object.values(this.strips).map((strip) => strip.element)),
-      section("Playing now", {}, this.graph.element),
+      section("Playing now", {}, this.graph.caption, this.graph.element),
       section(
         "Pace",
         {},
-        el("dl", { class: "readings" }, ...Object.values(this.readings).map((reading) => reading.element)),
+        el("dl", { class: "readings two" }, ...Object.values(this.readings).map((reading) => reading.element)),
       ),
     );
   }
