@@ -30,8 +30,11 @@ export class Cameras {
 
   constructor(private readonly camera: PerspectiveCamera) {}
 
-  set(view: View): void {
+  /** Take another view, from as far away if `sameDistance`. */
+  set(view: View, sameDistance = false): void {
+    const { distance } = this.eye;
     this.view = view;
+    if (sameDistance) this.eye_().distance = distance;
   }
 
   get eye(): Readonly<Eye> {

@@ -68,6 +68,12 @@ export class Shell {
       ),
     );
     options.hidden = true;
+    options.addEventListener("keydown", (event) => {
+      if (event.key !== "Escape") return;
+      event.stopPropagation();
+      this.toggleOptions();
+      eye.focus();
+    });
     this.element.append(
       el(
         "a",

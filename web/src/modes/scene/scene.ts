@@ -143,7 +143,7 @@ export class SceneMode implements Mode {
         { value: "top", label: "Top", icon: icons.top, title: "Key T" },
       ],
       "orbit",
-      (view) => this.page.stage.cameras.set(view),
+      (view) => this.page.stage.cameras.set(view, true),
     );
     this.fill();
     this.listen();
@@ -598,7 +598,7 @@ export class SceneMode implements Mode {
     if (tool) this.take(tool.tool);
     else if (views[key]) {
       this.view.set(views[key]);
-      this.page.stage.cameras.set(views[key]);
+      this.page.stage.cameras.set(views[key], true);
     } else if (key === "0") this.fit();
     else if (key === "delete") this.removeChosen();
     else if (key === "backspace") this.hands.back() || this.removeChosen();
