@@ -36,6 +36,10 @@ TRUNK, NECK = 0.515, 0.145
 """From the hip joints to the shoulder joints and on to the head's joint where the skeleton does not tell, metres."""
 
 
+CROWN = 0.31
+"""From the shoulder joints to the crown at least, metres."""
+
+
 class _Part(NamedTuple):
     tube: Tube
     weights: Float[Array, "vertices joints"]
@@ -128,6 +132,13 @@ def _trunk(body: _Body) -> list[_Part]:
         shoulders = low + TRUNK * scale * up if head is None else low + (head - low) * (TRUNK / (TRUNK + NECK))
     if head is None or (head - shoulders) @ up < 0.02 * scale:
         head = shoulders + NECK * scale * up
+    top = body.carrier("head", "neck", "chest", "spine1", "spine", "hips")
+    end = body.end(top) if top == roles.get("head") else None
+    if end is None or (end - head) @ up < 0.1 * scale:
+        end = head + 0.2 * scale * up
+    crown = head + _unit(end - head, UP) * min(np.linalg.norm(end - head), 0.24 * scale)
+    lift = max(CROWN * scale - float((crown - shoulders) @ up), 0.0) * up  # some files hang the head at the shoulders
+    head, crown = head + lift, crown + lift
     table = shape.rows_at(shape.TORSO, body.detail.torso)
     t = table[:, 0]
     path = np.array([low, shoulders, head])
@@ -138,7 +149,6 @@ def _trunk(body: _Body) -> list[_Part]:
     frames = np.tile(LEFT, (len(t), 1)), np.tile(FRONT, (len(t), 1))
     torso = shape.tube(centres, *frames, sizes, t, body.detail.around_torso, square=2.25)
 
-    top = body.carrier("head", "neck", "chest", "spine1", "spine", "hips")
     chain = _chain(body.skeleton, top)
     heights = (body.places[chain] - low) @ up
     weights = _graded(body, (torso.positions - low) @ up, chain, heights, 0.06 * scale)
@@ -146,11 +156,7 @@ def _trunk(body: _Body) -> list[_Part]:
         if f"{side}_shoulder" in roles and f"{side}_upper_arm" in roles:
             _shrug(body, side, torso, weights)
 
-    end = body.end(top) if top == roles.get("head") else None
-    if end is None or (end - head) @ up < 0.1 * scale:
-        end = head + 0.2 * scale * up
-    tip = head + _unit(end - head, UP) * min(np.linalg.norm(end - head), 0.24 * scale)
-    return [_Part(torso, weights), _head(body, head, tip, top)]
+    return [_Part(torso, weights), _head(body, head, crown, top)]
 
 
 def _head(body: _Body, neck: Float[Array, "3"], crown: Float[Array, "3"], joint: int) -> _Part:
