@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -58,6 +59,24 @@ def mocap() -> Path:
     if not folder.is_dir():
         absent("mocap", f"no recordings in {folder} (STRIDECAST_MOCAP names another folder)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def blender() -> str:
+    """A Python that has Blender as a module: ``STRIDECAST_BLENDER``, or this one."""
+    named = os.environ.get("STRIDECAST_BLENDER", "")
+    if not named and find_spec("bpy") is None:
+        absent("blender", "no bpy in this Python, and STRIDECAST_BLENDER names no other")
+    return named or sys.executable
+
+
+@pytest.fixture(scope="session")
+def pedpy() -> str:
+    """A Python that has PedPy: ``STRIDECAST_PEDPY``, or this one."""
+    named = os.environ.get("STRIDECAST_PEDPY", "")
+    if not named and find_spec("pedpy") is None:
+        absent("pedpy", "no PedPy in this Python, and STRIDECAST_PEDPY names no other")
+    return named or sys.executable
 
 
 @pytest.fixture

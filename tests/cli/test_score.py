@@ -1,17 +1,14 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
-from types import ModuleType
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from stridecast.cli.main import app
-from stridecast.errors import FileError
-from stridecast.model.trajectories import Trajectories
+from stridecast.formats.trajectories import save_trajectories
 from tracked import crowd, straight
 
 SCENE = """
@@ -38,31 +35,17 @@ def refused(*arguments: object) -> str:
 
 
 @pytest.fixture
-def walked(monkeypatch) -> Trajectories:
-    """What any CSV holds: one who goes through a tree's side and two who overlap."""
+def file(tmp_path) -> Path:
+    """One who goes through a tree's side and two who overlap."""
+    path = tmp_path / "walked.csv"
     content = crowd(
         straight((0, 0), (0, 1.2), 4.0), straight((0.98, 0), (0, 1.2), 4.0), straight((1.4, 0.0), (0, 1.2), 4.0)
     )
-
-    def load(path, *, frame_rate=None, unit=None, format=None):
-        if not Path(path).exists():
-            raise FileError("there is no such file", path=path)
-        return content
-
-    door = ModuleType("stridecast.formats.trajectories")
-    door.load_trajectories = load
-    monkeypatch.setitem(sys.modules, "stridecast.formats.trajectories", door)
-    return content
-
-
-@pytest.fixture
-def file(tmp_path) -> Path:
-    path = tmp_path / "walked.csv"
-    path.write_text("id,time,x,y\n")
+    save_trajectories(path, content)
     return path
 
 
-def test_a_table_tells_of_a_crowd(walked, file):
+def test_a_table_tells_of_a_crowd(file):
     text = call("score", file, "--bounds", "60,4,3,1.8,1.0").stdout
     for words in (
         "3 for 4.0 s at 30 Hz (363 samples)",
@@ -74,7 +57,7 @@ def test_a_table_tells_of_a_crowd(walked, file):
         assert words in text
 
 
-def test_a_scene_has_walls_and_people(walked, file, tmp_path):
+def test_a_scene_has_walls_and_people(file, tmp_path):
     scene = tmp_path / "scene.yaml"
     scene.write_text(SCENE)
     (content,) = json.loads(call("score", file, "--scene", scene, "--json").stdout)["files"]
@@ -87,13 +70,36 @@ def test_a_scene_has_walls_and_people(walked, file, tmp_path):
     assert wide["overlaps"]["pairs"] == 2
 
 
-def test_sampled_anew(walked, file):
+def test_moving_obstacles_are_where_they_were(tmp_path):
+    scene = tmp_path / "cart.yaml"
+    scene.write_text("""
+people: [{name: Ann, start: [3, 0]}]
+movers:
+  - {name: cart, radius: 0.5, times: [0, 3, 9], points: [[0, 0], [3, 0], [9, 0]]}
+seconds: 6
+""")
+    out = tmp_path / "out.csv"
+    call("crowd", scene, "-o", out, "--quiet")
+    (content,) = json.loads(call("score", out, "--scene", scene, "--json").stdout)["files"]
+    assert content["solid_overlaps"]["pairs"] == 0  # it waits before her
+    beside = tmp_path / "out.movers.csv"
+    lines = beside.read_text().splitlines()
+    assert lines[0] == "id,time,x,y"
+    assert float(lines[-1].split(",")[2]) < 3.0 - 0.5 - 0.2
+    beside.write_text("\n".join([*lines, "2,0.0,0.0,0.0"]))
+    assert "tells of 2 moving obstacles, the scene of 1" in refused("score", out, "--scene", scene)
+    beside.unlink()
+    (content,) = json.loads(call("score", out, "--scene", scene, "--json").stdout)["files"]
+    assert {o["other"] for o in content["solid_overlaps"]["each"]} == {"cart"}  # by the scene it runs over her
+
+
+def test_sampled_anew(file):
     (content,) = json.loads(call("score", file, "--rate", "10", "--speed", "1.2", "--json").stdout)["files"]
     assert content["frame_rate"] == pytest.approx(10)
     assert content["time_against_alone"]["median"] == pytest.approx(1.0)
 
 
-def test_motions_and_trajectories_in_one_call(walked, file, mocap):
+def test_motions_and_trajectories_in_one_call(file, mocap):
     take = mocap / "cmu" / "16" / "16_35.amc"
     one, other = json.loads(call("score", file, take, "--json").stdout)["files"]
     assert one["people"] == 3
@@ -118,11 +124,11 @@ def test_motions_and_trajectories_in_one_call(walked, file, mocap):
         (("--scene", "nowhere.yaml"), "nowhere.yaml"),
     ],
 )
-def test_wrong_wishes_are_refused(walked, file, arguments, says):
+def test_wrong_wishes_are_refused(file, arguments, says):
     assert says in refused("score", file, *arguments)
 
 
-def test_files_that_are_none_are_refused(walked, file, tmp_path):
+def test_files_that_are_none_are_refused(file, tmp_path):
     assert "absent.csv" in refused("score", file, tmp_path / "absent.csv")
     broken = tmp_path / "broken.bvh"
     broken.write_text("HIERARCHY\nROOT\n")

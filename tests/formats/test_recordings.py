@@ -88,7 +88,7 @@ def test_options_reach_the_conventions(tmp_path):
         load_motion(path, scale=-1.0)
 
 
-@pytest.mark.parametrize("name", ["walk.fbx", "walk.c3d", "walk", "walk.txt", "walk.asf"])
+@pytest.mark.parametrize("name", ["walk.fbx", "walk", "walk.txt", "walk.asf"])
 def test_other_files_are_refused_with_what_can_be_read(tmp_path, name):
     (tmp_path / name).write_bytes(b"Kaydara FBX Binary  \0" if name.endswith("fbx") else b"once upon a time")
     with pytest.raises(FileError, match=r"readable are \*.bvh \(BVH\), \*.amc \(AMC with its ASF\)"):

@@ -368,5 +368,5 @@ def test_wrong_options_are_refused(tmp_path):
         load_trajectories(path, frame_rate=math.nan)
     with pytest.raises(FileError, match="cannot be read"):
         load_trajectories(tmp_path / "nowhere.csv")
-    with pytest.raises(FileError, match=r"as \.csv or \.parquet, not as \.xml"):
+    with pytest.raises(FileError, match=r"as \.csv, \.parquet or \.txt, not as \.xml"):
         save_trajectories(tmp_path / "people.xml", load_trajectories(path))

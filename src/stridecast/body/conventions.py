@@ -95,7 +95,7 @@ def to_motion(
     InputError
         A scale that is not positive, or an unknown axis.
     """
-    notes: list[str] = []
+    notes = list(recording.notes)
     before = f"{source}: " if source else ""
     frames = len(recording.root_positions)
     if frames < 2:
@@ -126,7 +126,7 @@ def to_skeleton(
     recording: RawRecording, *, roles: Mapping[str, str] | None = None, scale: float | None = None
 ) -> tuple[Skeleton, tuple[str, ...]]:
     """Bring only the skeleton of a recording into the conventions; parameters and errors as of ``to_motion``."""
-    notes: list[str] = []
+    notes = list(recording.notes)
     recording, skeleton = _body(recording, roles, notes)
     skeleton = _scaled(skeleton, _unit(skeleton, recording.unit, scale, notes))
     return _skeleton_rested(skeleton, _rest_turn(skeleton, notes)), tuple(notes)

@@ -32,6 +32,8 @@ class RawRecording:
         Frames a second, if the file says.
     unit
         Metres per unit, if the file says.
+    notes
+        What the reader had to guess or leave out, one sentence each.
     """
 
     names: tuple[str, ...]
@@ -44,6 +46,7 @@ class RawRecording:
     slides: Mapping[int, Float[np.ndarray, "frames 3"]] = field(default_factory=dict)
     frame_rate: float | None = None
     unit: float | None = None
+    notes: tuple[str, ...] = ()
 
 
 def body_of(recording: RawRecording, roles: Mapping[str, int]) -> Skeleton:

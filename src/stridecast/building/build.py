@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from stridecast.analysis.bounds import METHODS
@@ -18,7 +19,7 @@ from stridecast.building.bench import Bench, Progress
 from stridecast.building.cache import TakeCache, key_of
 from stridecast.building.processes import Failure, Workers, attempt
 from stridecast.building.selection import body_of_most_seconds, said_twice
-from stridecast.building.sources import FileSource, MotionSource, Source, collect
+from stridecast.building.sources import FileSource, MotionSource, Source, collect, sha256_of_file
 from stridecast.building.stages import (
     AnalysisTask,
     Reading,
@@ -32,6 +33,7 @@ from stridecast.building.stages import (
 from stridecast.database.assembly import AnalysedTake, assemble
 from stridecast.errors import InputError, TakeError
 from stridecast.formats.recordings import load_skeleton
+from stridecast.formats.smpl import read_body_model
 from stridecast.formats.store import as_stored
 from stridecast.formats.tensors import pack_skeleton
 from stridecast.model.database import MotionDatabase, Take
@@ -58,6 +60,7 @@ def build(
     roles: Mapping[str, str] | None = None,
     scale: float | None = None,
     input_rate: float | None = None,
+    body_model: str | Path | None = None,
     cache: bool = True,
     progress: Progress | None = None,
 ) -> MotionDatabase:
@@ -66,8 +69,8 @@ def build(
     Parameters
     ----------
     sources
-        Files and folders (searched to the bottom): BVH, and AMC with its ASF. Motions in memory go the same way; in the
-        database and in messages their names stand in place of a file.
+        Files and folders (searched to the bottom): BVH, AMC with its ASF, AMASS, C3D. Motions in memory go the same
+        way; in the database and in messages their names stand in place of a file.
     skeleton
         Body that all motion is carried over to: a skeleton, or a BVH or ASF file. Left out: the body of the person with
         the most seconds.
@@ -83,6 +86,8 @@ def build(
         As of ``load_motion``, for all files; a motion in memory is as it is.
     input_rate
         Frames a second of files that do not say (AMC), 120 if left out.
+    body_model
+        As of ``load_motion``, for all AMASS files.
     cache
         Remember what was found out about each take, so that the next build is faster.
     progress
@@ -99,13 +104,20 @@ def build(
     InputError
         No source, a source that does not exist or holds no recording, or an option that is none.
     FileError, SkeletonError
-        A ``skeleton`` that cannot be read or lacks joints of the legs.
+        A ``skeleton`` that cannot be read or lacks joints of the legs, or a ``body_model`` that is none.
     TakeError
         No take could be used; the message gives the first reasons.
     """
     _check_options(frame_rate, bounds, jobs, scale, input_rate)
     body = _load_body(skeleton, roles, scale)
-    reading = Reading(roles=None if roles is None else dict(roles), scale=scale, input_rate=input_rate)
+    if body_model is not None:
+        read_body_model(body_model, np.zeros(0))  # said once, not with every take
+    reading = Reading(
+        roles=None if roles is None else dict(roles),
+        scale=scale,
+        input_rate=input_rate,
+        body_model=None if body_model is None else Path(body_model),
+    )
     offered = collect([sources] if isinstance(sources, str | Path | Motion) else sources)
     with Workers(jobs or os.cpu_count() or 1) as workers:
         bench = Bench(workers=workers, cache=TakeCache.of_user() if cache else TakeCache(None), progress=progress)
@@ -200,7 +212,8 @@ def _motion_of(source: Source, recording: Recording, reading: Reading) -> Motion
 
 def _key(stage: str, source: Source, reading: Reading, **more: object) -> str:
     """Name under which a result is remembered."""
-    options = {"roles": reading.roles, "scale": reading.scale, "input_rate": reading.input_rate}
+    options: dict[str, object] = {"roles": reading.roles, "scale": reading.scale, "input_rate": reading.input_rate}
+    options["body_model"] = "" if reading.body_model is None else sha256_of_file(reading.body_model)
     told = {"sha256": source.sha256, "companions": source.companions, "place": source.place}
     return key_of(stage=stage, **told, **options, **more)
 

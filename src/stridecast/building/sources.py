@@ -122,7 +122,7 @@ def collect(sources: Iterable[str | Path | Motion]) -> list[Source]:
         raise InputError(f"name at least one recording or folder of recordings ({_readable()})")
     companions = cache(_skeletons_beside)
     files = [
-        FileSource(path=path, sha256=_sha256(path), companions=companions(path.parent) if _is_amc(path) else "")
+        FileSource(path=path, sha256=sha256_of_file(path), companions=companions(path.parent) if _is_amc(path) else "")
         for path in sorted(found.values())
     ]
     return [*files, *(MotionSource(motion=motion, sha256=_sha256_of(motion)) for motion in motions)]
@@ -152,7 +152,8 @@ def _readable() -> str:
     return ", ".join(f"*{suffix} ({what})" for suffix, what in RECORDINGS.items())
 
 
-def _sha256(path: Path) -> str:
+def sha256_of_file(path: Path) -> str:
+    """Hash the content of a file; "" if it cannot be read."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -172,4 +173,4 @@ def _sha256_of(motion: Motion) -> str:
 def _skeletons_beside(folder: Path) -> str:
     """One hash of all ASF files in a folder: an AMC may take any of them."""
     files = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".asf")
-    return hashlib.sha256("".join(_sha256(path) for path in files).encode()).hexdigest()
+    return hashlib.sha256("".join(sha256_of_file(path) for path in files).encode()).hexdigest()

@@ -17,11 +17,15 @@ from stridecast.model.skeleton import Skeleton
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """How recordings are read: joints by role, metres per unit, frames a second where a file does not say."""
+    """How recordings are read.
+
+    Joints by role, metres per unit, frames a second where a file does not say, and the body model of SMPL bodies.
+    """
 
     roles: Mapping[str, str] | None = None
     scale: float | None = None
     input_rate: float | None = None
+    body_model: Path | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,13 +92,13 @@ def take_up(motion: Motion) -> Recording:
 
 def _load(task: ReadTask) -> tuple[Motion, tuple[str, ...]]:
     reading = task.reading
-    says_rate = task.path.suffix.lower() == ".bvh"
     try:
         return load_recording(
             task.path,
             roles=reading.roles,
             scale=reading.scale,
-            frame_rate=None if says_rate else reading.input_rate,
+            assumed_rate=reading.input_rate,
+            body_model=reading.body_model,
         )
     except InputError as error:
         raise TakeError(_without_path(error, task.path)) from error

@@ -12,7 +12,7 @@ import typer
 def build(
     sources: Annotated[
         list[Path],
-        typer.Argument(help="Recordings (BVH, or AMC with its ASF) and folders of them.", show_default=False),
+        typer.Argument(help="Recordings (BVH, AMC with its ASF, AMASS, C3D) and folders of them.", show_default=False),
     ],
     output: Annotated[
         Path,
@@ -30,6 +30,10 @@ def build(
     ] = None,
     input_rate: Annotated[
         float | None, typer.Option(metavar="HZ", help="Frames a second of files that do not say (AMC); else 120.")
+    ] = None,
+    body_model: Annotated[
+        Path | None,
+        typer.Option(metavar="MODEL.npz", help="Body model of SMPL for AMASS files; else they get a mean skeleton."),
     ] = None,
     mirror: Annotated[bool, typer.Option("--mirror/--no-mirror", help="Learn from mirror images too.")] = True,
     bounds: Annotated[
@@ -65,6 +69,7 @@ def build(
             jobs=jobs,
             scale=scale,
             input_rate=input_rate,
+            body_model=body_model,
             cache=cache,
             progress=progress,
         )

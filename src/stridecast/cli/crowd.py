@@ -22,8 +22,8 @@ def crowd(
         typer.Option(
             "--output",
             "-o",
-            metavar="OUT.csv|.parquet|.bvh",
-            help="Where everybody was, or a BVH for each of them as well (OUT.NAME.bvh, OUT.people.csv, OUT.csv).",
+            metavar="OUT.csv|.parquet|.bvh|.usd[a|c]",
+            help="Where everybody was; with a BVH for each (OUT.NAME.bvh, OUT.people.csv), or one USD scene of all.",
             show_default=False,
         ),
     ],
@@ -40,7 +40,7 @@ def crowd(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
-    """Let everybody in a scene walk and avoid each other, and write where they were, or their motions as BVH.
+    """Let everybody in a scene walk and avoid each other, and write where they were, or their motions as BVH or USD.
 
     What is written is written as it comes: if it is interrupted, OUT.part.csv and the BVH of all who have left stay.
     """
@@ -56,7 +56,7 @@ def crowd(
     if seed is not None and not 0 <= seed < 2**32:
         raise InputError(f"--seed must be a whole number from 0 to {2**32 - 1}, not {seed}")
     place = load_scene(scene)
-    files = CrowdFiles(output)
+    files = CrowdFiles(output, movers=len(place.movers))
     learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {"ways": "finding ways", "bake": "walking"}) as progress:
         people = Crowd(
@@ -98,6 +98,8 @@ def _write_frame(files: CrowdFiles, frame: CrowdFrame) -> None:
 
     speeds = np.linalg.norm(frame.velocities, axis=-1)
     files.add_rows(frame.ids, np.full(len(frame.ids), frame.time), frame.positions, frame.headings, speeds)
+    if len(frame.movers):
+        files.add_movers(frame.time, frame.movers)
 
 
 def _tell(baking: Baking, files: CrowdFiles) -> None:
@@ -113,7 +115,7 @@ def _tell(baking: Baking, files: CrowdFiles) -> None:
         f"{tally.came} people came, {tally.arrived} arrived, {tally.there} still there{waiting}; "
         f"{tally.most} at once at most, {tally.overlaps} overlaps"
     )
-    motions = f"{len(files.motions)} BVH, " if files.bodies else ""
+    motions = f"{len(files.motions)} BVH, " if files.motions else ""
     names = ", ".join(str(path) for path in files.files)
     said = f"{tally.frames} frames, {tally.frames / rate:.1f} s, {tally.metres:.1f} m walked"
     screen.out.print(f"{said}: {motions}[bold]{escape(names)}[/]")

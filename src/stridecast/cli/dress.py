@@ -28,8 +28,8 @@ def dress(
         typer.Option(
             "--output",
             "-o",
-            metavar="OUT.bvh|.csv|.parquet",
-            help="A BVH for each person (OUT.ID.bvh, OUT.people.csv, OUT.csv), or only where they were.",
+            metavar="OUT.bvh|.usd[a|c]|.csv|.parquet",
+            help="A BVH for each person (OUT.ID.bvh, OUT.people.csv), or one USD scene; or only where they were.",
             show_default=False,
         ),
     ],
@@ -51,7 +51,7 @@ def dress(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a report as JSON.")] = False,
 ) -> None:
-    """Put full bodies on trajectories, as near to them as a person can walk, and write their motions as BVH.
+    """Put full bodies on trajectories, as near to them as a person can walk, and write their motions as BVH or USD.
 
     Noise, sway and what no person can do are taken out; the report tells how far that leads away from the source.
     """
@@ -130,7 +130,7 @@ def _tell(report: dict[str, Any], files: CrowdFiles) -> None:
 
     each, mean, most = report["each"], 100 * report["mean_distance"], 100 * report["largest_distance"]
     seconds = report["frames"] / report["frame_rate"]
-    motions = f"{len(files.motions)} BVH, " if files.bodies else ""
+    motions = f"{len(files.motions)} BVH, " if files.motions else ""
     names = ", ".join(str(path) for path in files.files)
     screen.out.print(f"{report['people']} people, {seconds:.1f} s of them: {motions}[bold]{escape(names)}[/]")
     screen.out.print(

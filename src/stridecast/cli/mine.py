@@ -43,7 +43,8 @@ def mine(
     cycles: Annotated[int | None, typer.Option(metavar="N", help="So many cycles; one if left out.")] = None,
     seconds: Annotated[float | None, typer.Option(metavar="S", help="So long, instead.")] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", metavar="OUT.bvh", help="The motion to write.", show_default=False)
+        Path | None,
+        typer.Option("--output", "-o", metavar="OUT.bvh|.usd[a|c]", help="The motion to write.", show_default=False),
     ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
@@ -55,14 +56,10 @@ def mine(
     """
     from stridecast.cli import screen
     from stridecast.database.mining import mine as find
-    from stridecast.errors import FileError
+    from stridecast.formats.motion_files import check_motion_place, write_motion
 
     if output is not None:
-        from stridecast.formats.files import check_place
-
-        if output.suffix.lower() != ".bvh":
-            raise FileError("motion is written as *.bvh", path=output)
-        check_place(output)
+        check_motion_place(output)
     wish = {name: _number(name, text) for name, text in (("speed", speed), ("turn", turn), ("style", style))}
     learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {}):
@@ -78,9 +75,7 @@ def mine(
             seconds=seconds,
         )
     if output is not None:
-        from stridecast.formats.bvh import write_bvh
-
-        write_bvh(output, mined.motion)
+        write_motion(output, mined.motion)
     if as_json:
         screen.print_json(_as_json(mined, output))
     elif not quiet:

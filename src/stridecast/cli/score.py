@@ -88,11 +88,14 @@ def _score_trajectories(
     input_rate: float | None,
     bounds: Bounds | None,
 ) -> CrowdScore:
+    from stridecast.formats.crowd_files import moved_as_written
     from stridecast.formats.trajectories import load_trajectories
     from stridecast.scorecard.crowds import USUAL_RADIUS, score_crowd
     from stridecast.scorecard.roster import Roster, roster
 
     trajectories = load_trajectories(path, frame_rate=input_rate)
+    if scene is not None:
+        scene = moved_as_written(scene, path)
     known = Roster() if scene is None else roster(scene, trajectories)
     radii = {person: known.radii.get(person, USUAL_RADIUS) for person in trajectories.people.tolist()}
     return score_crowd(

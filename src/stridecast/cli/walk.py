@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,9 @@ import typer
 from stridecast.cli.databases import Database, open_database
 
 if TYPE_CHECKING:
+    from stridecast.formats.vmc import VmcSender
     from stridecast.model.database import MotionDatabase
+    from stridecast.model.motion import Motion
     from stridecast.model.scene import Scene
     from stridecast.paths.follow import PathWalk
     from stridecast.steering.force import SteeringGains
@@ -23,17 +26,16 @@ if TYPE_CHECKING:
 SPEEDS = {"stand": 1.3, "walk": 1.3, "run": 3.0}
 """Usual speed along curves and paths, m/s."""
 
-OUTPUTS = (".bvh",)
-
 SLOWED_SHOWN = 5
 """So many places are told at which a plan is slower than asked for."""
 
 
 def walk(
-    output: Annotated[
-        Path, typer.Option("--output", "-o", metavar="OUT.bvh", help="The motion to write.", show_default=False)
-    ],
     database: Database = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", metavar="OUT.bvh|.usd[a|c]", help="The motion to write.", show_default=False),
+    ] = None,
     points: Annotated[
         Path | None, typer.Option("--input", metavar="POINTS.csv", help="Samples to follow: time,x,z[,motion].")
     ] = None,
@@ -70,31 +72,36 @@ def walk(
     damping_ratio: Annotated[
         float | None, typer.Option(help="1 comes to rest at the point, less swings past it; else 1.")
     ] = None,
+    vmc: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Play it in real time to a receiver of the VMC protocol.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
-    """Let a character follow points or a curve, or go along a path or through a scene, and write its motion.
+    """Let a character follow points or a curve, or go along a path or through a scene, and write or play its motion.
 
     Name one of --input, --curve, --path and --scene. Points and curves are followed as if by hand; the speed along a
     path or through a scene is planned ahead, so that its shape is kept.
     """
-    from stridecast.errors import FileError
+    from stridecast.errors import FileError, InputError
 
+    if output is None and vmc is None:
+        raise InputError("name a file to write with --output, or a receiver with --vmc")
     _check(points, curve, path, scene, motion, speed, half_life, damping_ratio)
     ways = (output, points, path, scene, database)
     if trace is not None and trace.absolute() in {p.absolute() for p in ways if p}:
         raise FileError("the trace would overwrite another file of this walk", path=trace)
 
     from stridecast.cli import screen
-    from stridecast.formats.bvh import write_bvh
     from stridecast.formats.files import check_place, replacing
+    from stridecast.formats.motion_files import check_motion_place, write_motion
     from stridecast.formats.trace import trace_text
 
-    if output.suffix.lower() not in OUTPUTS:
-        raise FileError(f"motion is written as {', '.join(f'*{s}' for s in OUTPUTS)}", path=output)
-    for place in (output, trace):
-        if place is not None:
-            check_place(place)
+    if output is not None:
+        check_motion_place(output)
+    if trace is not None:
+        check_place(trace)
+    sender = None if vmc is None else _sender(vmc)
     how: dict[str, Any] = {"subject": subject, "frame_rate": rate, "size": size}
     if style is not None:
         how["style"] = _style(style)
@@ -112,21 +119,44 @@ def walk(
         learned = open_database(database, quiet=quiet)
         with screen.progress(quiet, words) as progress:
             journey = _followed(learned, stream, gains, how, progress)
-    if trace is None:
-        write_bvh(output, journey.motion)
-    else:
-        with replacing(trace) as file:  # takes its place only once the motion has been written too
+    with replacing(trace) if trace is not None else nullcontext() as file:
+        if file is not None:  # takes its place only once the motion has been written too
             file.write(trace_text(journey).encode())
-            write_bvh(output, journey.motion)
+        if output is not None:
+            write_motion(output, journey.motion)
+    if sender is not None:
+        with sender, screen.progress(quiet, {"play": "playing"}) as progress:
+            _play(sender, journey.motion, progress)
     summary = _summary(journey, walked, output, trace)
     if as_json:
         screen.print_json(summary)
     elif not quiet:
         said = "{frames} frames, {seconds:.1f} s, {metres:.1f} m, at most {fastest:.2f} m/s".format_map(summary)
         made_up = f", {journey.made_up} transitions made up" if journey.made_up else ""
-        screen.out.print(f"{said}{made_up}: [bold]{output}[/]" + (f", {trace}" if trace else ""))
+        where = [f"[bold]{output}[/]"] if output else []
+        where += [str(trace)] if trace else []
+        where += [f"played to {vmc}"] if vmc else []
+        screen.out.print(f"{said}{made_up}: {', '.join(where)}")
         if walked is not None:
             _tell_plan(walked)
+
+
+def _sender(address: str) -> VmcSender:
+    from stridecast.formats.vmc import VmcSender, parsed_address
+
+    return VmcSender(*parsed_address(address))
+
+
+def _play(sender: VmcSender, motion: Motion, progress: Tell) -> None:
+    """Send every frame when its time has come; one that is late is sent at once, none is left out."""
+    from time import monotonic, sleep
+
+    began = monotonic()
+    for n, pose in enumerate(zip(motion.root_positions, motion.rotations, strict=True)):
+        due = n / motion.frame_rate
+        sleep(max(0.0, due - (monotonic() - began)))
+        sender.send(motion.skeleton, pose, due)
+        progress("play", n + 1, motion.frames)
 
 
 def _check(
@@ -254,12 +284,12 @@ def _stream(points: Path | None, curve: str | None, motion: str, speed: float | 
     return stream_along(way, pace, motion=motion)
 
 
-def _summary(journey: Journey, walked: PathWalk | None, output: Path, trace: Path | None) -> dict[str, object]:
+def _summary(journey: Journey, walked: PathWalk | None, output: Path | None, trace: Path | None) -> dict[str, object]:
     import numpy as np
 
     steps = np.linalg.norm(np.diff(journey.positions, axis=0), axis=-1)
     summary: dict[str, object] = {
-        "output": str(output),
+        "output": None if output is None else str(output),
         "trace": None if trace is None else str(trace),
         "frame_rate": journey.motion.frame_rate,
         "frames": journey.motion.frames,

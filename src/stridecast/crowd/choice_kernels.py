@@ -44,6 +44,12 @@ GENTLE = 1.0
 WALL = 0.25
 """The same price for walls, which do not move."""
 
+WALLS, WALLS_AHEAD = 4.0, 2.0
+"""They are looked for so far ahead, metres, or as far as one gets in so many seconds."""
+
+CARRIED = 0.25
+"""So long runners are carried on as they were, seconds."""
+
 DETOUR = 0.8
 """Price of going backwards, half of that sideways, in units of losing all of the wished speed."""
 
@@ -56,7 +62,7 @@ HEADWAY = 0.4
 JAM = 0.08
 """Nearer than this nobody follows, metres."""
 
-JAM_LEFT_ALONE = 0.35
+JAM_LEFT_ALONE = 0.8
 """The same of people who block each other: they need the room, metres."""
 
 FREE = 6.0
@@ -135,6 +141,7 @@ def weigh(
     still = aim > 0.0 and math.hypot(moving.velocity[c, 0], moving.velocity[c, 1]) < 0.3
     firmly = 0.0 if rule in (ON_THE_WAY, RETURN) else TURNING
     radius, keep = people.radius[c], min(people.keep[c], 0.5)
+    far = max(WALLS, WALLS_AHEAD * fastest)
     n = 0
     for a in range(len(ANGLES) + 1):
         if a < len(ANGLES):
@@ -145,8 +152,12 @@ def weigh(
             sine, cosine = ax * dz - az * dx, ax * dx + az * dz
         else:
             ax, az, sine, cosine = dx, dz, 0.0, 1.0
-        wall = free_way(ground, things, standing, x, z, ax, az, radius, 4.0)
         top = min(fastest, most)
+        wall = free_way(ground, things, standing, x, z, ax, az, radius, far)
+        if people.runs[c]:  # who is fast is carried on before the new direction is reached
+            sx = x + CARRIED * (moving.velocity[c, 0] - top * ax)
+            sz = z + CARRIED * (moving.velocity[c, 1] - top * az)
+            wall = min(wall, free_way(ground, things, standing, sx, sz, ax, az, radius, far))
         for m in range(count):
             o = seen[m]
             along = o[PX] * ax + o[PZ] * az
@@ -175,10 +186,10 @@ def weigh(
             lost = 1.0 - speed * scale
             cost = wrong + firm * (lost * lost + DETOUR * (1.0 - cosine))
             cost += CHANGE * scale * scale * ((ux - moving.target[c, 0]) ** 2 + (uz - moving.target[c, 1]) ** 2)
-            if wall < 4.0:
+            if wall < far:
                 hit = wall / max(speed, 1e-3)
-                if hit < 2.0:
-                    cost += WALL * (1.0 - 0.5 * hit) ** 2 / (hit * hit + 0.08)
+                if hit < WALLS_AHEAD:
+                    cost += WALL * (1.0 - hit / WALLS_AHEAD) ** 2 / (hit * hit + 0.08)
             costs[n] = cost + people_in_the_way(seen, count, radius, keep, ux, uz, yields)
             targets[n, 0], targets[n, 1] = ux, uz
             n += 1

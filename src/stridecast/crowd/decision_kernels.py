@@ -12,7 +12,7 @@ from stridecast.crowd.rule_kernels import answer
 from stridecast.crowd.rules import GIVE_WAY, ON_THE_WAY, RETURN, STAND, WAIT
 from stridecast.crowd.state import Ground, Moving, People, Ways
 from stridecast.crowd.vehicle_kernels import BACK, REST
-from stridecast.crowd.way_kernels import place_at, room_in, round_the_jam, way_out
+from stridecast.crowd.way_kernels import back_aside, place_at, room_in, round_the_jam, way_out
 from stridecast.geometry.kernels import kernel
 
 CHANGING = 0.8
@@ -34,8 +34,8 @@ STUCK = 0.7
 ROOM = 0.4
 """Behind people who block each other there should be so much room, metres ..."""
 
-STEPPING_BACK, STEP_BACK = 0.6, 1.5
-"""... so this part of those who have less step back, for so long (seconds) ..."""
+STEPPING_BACK, STEP_BACK, STEP_BACK_A_BIT = 0.97, 6.0, 1.5
+"""... so nearly all who have less step back, for so long; behind a wedge less; seconds ..."""
 
 A_BIT = 0.06
 """Who is wedged steps back by as little as this, metres."""
@@ -135,15 +135,20 @@ def decide(
             if jammed == 0.0:
                 patience *= QUEUING
             elif back or jammed == 1.0:
-                if back:
+                x, z = moving.position[c, 0], moving.position[c, 1]
+                own = people.side[c] if people.side[c] != 0.0 else -1.0
+                if back and jammed == 1.0:
+                    dx, dz, behind = back_aside(
+                        ground, things, standing, seen, count, x, z, people.radius[c], dx, dz, own, behind
+                    )
+                elif back:
                     dx, dz = -dx, -dz
                 else:
-                    own = people.side[c] if people.side[c] != 0.0 else -1.0
                     if luck > 1.0 - CONTRARY:
                         own = -own
-                    x, z = moving.position[c, 0], moving.position[c, 1]
                     dx, dz = round_the_jam(ground, things, standing, x, z, people.radius[c], dx, dz, own)
-                moving.retreat[c] = min(STEP_BACK, behind / BACK) if back else GOING_ROUND * (0.6 + 0.8 * luck)
+                longest = STEP_BACK if jammed == 1.0 else STEP_BACK_A_BIT
+                moving.retreat[c] = min(longest, behind / BACK) if back else GOING_ROUND * (0.6 + 0.8 * luck)
                 moving.retreat_way[c, 0], moving.retreat_way[c, 1] = dx, dz
                 rule, most, side = GIVE_WAY, np.inf, 0.0
                 moving.stuck[c] = 0.5 * STUCK
@@ -162,8 +167,8 @@ def decide(
                 dz,
                 luck,
             )
-            moving.stuck[c] = 0.0
-            if space > 0.3:
+            if space > 0.3:  # else one waits on, and those behind see it
+                moving.stuck[c] = 0.0
                 moving.retreat[c] = 0.8 + 1.6 * luck
                 moving.retreat_way[c, 0], moving.retreat_way[c, 1] = bx, bz
                 dx, dz, rule, most, side = bx, bz, GIVE_WAY, np.inf, 0.0

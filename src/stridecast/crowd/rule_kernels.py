@@ -45,6 +45,9 @@ OFFSET = 0.7
 ELBOWS = 0.1
 """Room that somebody takes beyond their body who overtakes, metres."""
 
+PASSES = 3.0
+"""Room for it is looked for no longer ahead than this, seconds."""
+
 CLOSING_UP = 0.15
 """Who follows may be so much faster, m/s."""
 
@@ -143,7 +146,8 @@ def answer(
         rule = HEAD_ON
     elif between < SAME:
         along = ex * dx + ez * dz
-        left, right = room_beside(moving, ground, things, standing, seen, count, c, threat, dx, dz)
+        beside = min(soonest + 2.0 * (radius + o[RADIUS]) / max(wish - along, 0.3), PASSES)
+        left, right = room_beside(moving, ground, things, standing, seen, count, c, threat, dx, dz, beside)
         need = 2.0 * radius + ELBOWS
         if max(left, right) < need or wish < along + 0.1:
             return FOLLOW, j, soonest, 0.0, along + CLOSING_UP
@@ -193,12 +197,20 @@ def room_beside(
     whom: int,
     dx: float,
     dz: float,
+    beside: float,
 ) -> tuple[float, float]:
-    """Free width to the left and to the right of somebody who goes ahead, up to walls and to other people, metres."""
+    """Free width to the left and to the right of somebody who goes ahead, up to walls and to other people, metres.
+
+    Up to walls it is the smaller one of now and of ``beside`` seconds later, when one would have passed.
+    """
     o = seen[whom]
     x, z = moving.position[c, 0] + o[PX], moving.position[c, 1] + o[PZ]
-    left = free_way(ground, things, standing, x, z, dz, -dx, 0.0, 3.0) - o[RADIUS]
-    right = free_way(ground, things, standing, x, z, -dz, dx, 0.0, 3.0) - o[RADIUS]
+    left, right = 3.0, 3.0
+    for _ in range(2):
+        left = free_way(ground, things, standing, x, z, dz, -dx, 0.0, left)
+        right = free_way(ground, things, standing, x, z, -dz, dx, 0.0, right)
+        x, z = x + beside * o[EX], z + beside * o[EZ]
+    left, right = left - o[RADIUS], right - o[RADIUS]
     for m in range(count):
         if m == whom:
             continue

@@ -27,7 +27,10 @@ STANDING = 24
 """So many walls and obstacles near somebody are looked at, the nearest."""
 
 REACH = 5.0
-"""... within this, metres."""
+"""... within this, metres, ..."""
+
+REACH_AHEAD = 2.5
+"""... or as far as one gets in so many seconds."""
 
 DECIDES = 0.1
 """Everybody decides anew about so often, seconds."""
@@ -76,7 +79,7 @@ def propose(
             moving.free[c] = conflict(people, moving, cells, farthest, widest, c, False) < 0
             continue
         x, z = moving.position[c, 0], moving.position[c, 1]
-        standing = standing_near(ground, x, z, REACH, things)
+        standing = standing_near(ground, x, z, max(REACH, REACH_AHEAD * people.wish[c]), things)
         decides = (frame + people.number[c]) % every == 0
         if not decides and try_target(
             people,

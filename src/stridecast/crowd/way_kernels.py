@@ -29,6 +29,9 @@ RETREAT_SPEED = 0.8
 ROUND = np.radians(np.array([75.0, 45.0, -75.0, -45.0, 20.0]))
 """How far to their side people go who go round a jam; below 0 to the other side."""
 
+ASIDE = (math.cos(math.radians(40.0)), math.sin(math.radians(40.0)))
+"""Who steps back out of a jam goes so far aside: cosine, sine."""
+
 AROUND = 16
 """Directions in which room is looked for."""
 
@@ -173,6 +176,33 @@ def way_out(
         if value > best:
             best, bx, bz, space = value, ax, az, way
     return bx, bz, space
+
+
+@kernel
+def back_aside(
+    ground: Ground,
+    things: np.ndarray,
+    standing: int,
+    seen: np.ndarray,
+    count: int,
+    x: float,
+    z: float,
+    radius: float,
+    dx: float,
+    dz: float,
+    side: float,
+    behind: float,
+) -> tuple[float, float, float]:
+    """Direction in which somebody steps back, and how far they can: to their side where there is room for it.
+
+    All do it to the same side, so that those who come out of the jam have made lanes. ``behind`` is the room straight
+    back.
+    """
+    bx, bz = -ASIDE[0] * dx + side * ASIDE[1] * dz, -ASIDE[0] * dz - side * ASIDE[1] * dx
+    aside = room_in(seen, count, radius, bx, bz)
+    if aside > 0.6 * behind and free_way(ground, things, standing, x, z, bx, bz, radius + 0.01, 0.6) > 0.3:
+        return bx, bz, aside
+    return -dx, -dz, behind
 
 
 @kernel

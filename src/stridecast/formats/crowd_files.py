@@ -7,6 +7,8 @@ import io
 import re
 import time
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from types import TracebackType
@@ -18,13 +20,17 @@ from jaxtyping import Float, Int
 from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
 from stridecast.formats.files import check_place
+from stridecast.formats.trajectories import load_trajectories
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
+from stridecast.formats.usd import ENDINGS as USD
+from stridecast.formats.usd import UsdScene, check_usd
 from stridecast.geometry import ground
 from stridecast.model.motion import Motion
+from stridecast.model.scene import Scene
 
 Array = np.ndarray
 
-OUTPUTS = (".csv", ".parquet", ".bvh")
+OUTPUTS = (".csv", ".parquet", ".bvh", *USD)
 """Endings of what a crowd is written as."""
 
 FLUSH = 1.0
@@ -105,6 +111,10 @@ class CrowdFiles:
         Everybody's places: ``id,time,x,y,heading,speed``.
     ``x.bvh``
         ``x.csv``, and for each person ``x.NAME.bvh``; ``x.people.csv`` tells whose is which, and when each begins.
+    ``x.usd``, ``x.usda``, ``x.usdc``
+        ``x.csv``, and everybody in one scene, which is written at the end; what an error leaves is ``x.part.usd``.
+    ``x.movers.csv``
+        Beside each of these, where the obstacles were that move; they wait for people (see ``moved_as_written``).
 
     Rows are written as they come, to ``x.part.csv`` and ``x.people.part.csv``, which take their names at the end. Where
     an error ends the context before, they stay as they are, and so does each BVH.
@@ -113,6 +123,8 @@ class CrowdFiles:
     ----------
     output
         A name as above.
+    movers
+        So many obstacles move.
 
     Raises
     ------
@@ -120,11 +132,15 @@ class CrowdFiles:
         Another ending, or the file system refuses.
     """
 
-    def __init__(self, output: str | Path) -> None:
+    def __init__(self, output: str | Path, *, movers: int = 0) -> None:
         self.output = Path(output)
-        self.bodies = kind_of(self.output) == ".bvh"
+        kind = kind_of(self.output)
+        self.bodies = kind == ".bvh" or kind in USD
         self.table = self.output.with_suffix(".csv") if self.bodies else self.output
-        self.index = self.output.with_suffix(".people.csv") if self.bodies else None
+        self.movers = movers_of(self.output) if movers else None
+        self.index = self.output.with_suffix(".people.csv") if kind == ".bvh" else None
+        self._scene: UsdScene | None = None
+        self._in_scene = kind in USD
         self.motions: list[Path] = []
         self.kept: list[Path] = []
         self._names: set[str] = set()
@@ -134,6 +150,8 @@ class CrowdFiles:
         self._parts.append(PartFile(self.table, "id,time,x,y,heading,speed"))
         if self.index is not None:
             self._parts.append(PartFile(self.index, "id,name,start,seconds,frames,height,file"))
+        if self.movers is not None:
+            self._parts.append(PartFile(self.movers, "id,time,x,y"))
         return self
 
     def __exit__(
@@ -146,9 +164,12 @@ class CrowdFiles:
                     part.close()
                 except FileError:  # the disk is full, say: what ended it all is more to the point
                     continue
+            self._keep_scene()
             return
         for part in self._parts:
             part.close()
+        if self._in_scene:
+            (self._scene or UsdScene(30.0)).save(self.output)
         for part in self._parts:
             if part.path.suffix.lower() == ".parquet":
                 csv_to_parquet(part.part, part.path)
@@ -157,10 +178,22 @@ class CrowdFiles:
                 part.rename()
             self.kept.remove(part.part)
 
+    def _keep_scene(self) -> None:
+        """Write who has left until now beside the scene that is not finished."""
+        if self._scene is None:
+            return
+        ending = self.output.suffix
+        names = (self.output.with_suffix(f".part{k if k > 1 else ''}{ending}") for k in count(1))
+        part = next(name for name in names if not name.exists())
+        with suppress(FileError):
+            self._scene.save(part)
+            self.kept.append(part)
+
     @property
     def files(self) -> tuple[Path, ...]:
         """Everything that is written, without the motions."""
-        return tuple(path for path in (self.table, self.index) if path is not None)
+        scene = self.output if self._in_scene else None
+        return tuple(path for path in (scene, self.table, self.index, self.movers) if path is not None)
 
     def add_rows(
         self,
@@ -176,8 +209,17 @@ class CrowdFiles:
         columns = (ids.tolist(), times.tolist(), x.tolist(), y.tolist(), angles.tolist(), speeds.tolist())
         self._parts[0].add("".join([ROW % row for row in zip(*columns, strict=True)]))
 
+    def add_movers(self, time: float, places: Float[Array, "movers 2"]) -> None:
+        """Add where moving obstacles are, ground points, in the order of the scene."""
+        rows = [f"{k + 1},{time:.9f},{x:.8f},{0.0 - z:.8f}\n" for k, (x, z) in enumerate(places.tolist())]
+        self._parts[-1].add("".join(rows))
+
     def add_motion(self, number: int, name: str, start: float, motion: Motion, height: float) -> Path:
         """Write somebody's motion and its row of the index; ``start`` in seconds, ``height`` in metres."""
+        if self._in_scene:
+            self._scene = self._scene or UsdScene(motion.frame_rate)
+            self._scene.add(motion, name=name, start=start)
+            return self.output
         path = self._place_of(number, name)
         write_bvh(path, motion)
         self.motions.append(path)
@@ -194,6 +236,35 @@ class CrowdFiles:
         return self.output.with_suffix(f".{word}.bvh")
 
 
+def movers_of(path: Path) -> Path:
+    """The file beside a table that tells where the moving obstacles of a scene were."""
+    return path.with_suffix(".movers.csv")
+
+
+def moved_as_written(scene: Scene, path: Path) -> Scene:
+    """The scene with its moving obstacles as they were while a table was written, if there is a file that tells.
+
+    They wait for people who are in their way, so that they may be later than the scene says.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or tells of other obstacles than the scene.
+    """
+    beside = movers_of(path)
+    if not (scene.movers and beside.exists()):
+        return scene
+    told = load_trajectories(beside)
+    if told.people.tolist() != list(range(1, len(scene.movers) + 1)):
+        raise FileError(f"tells of {len(told.people)} moving obstacles, the scene of {len(scene.movers)}", path=beside)
+    rows = [told.rows(k + 1) for k in range(len(scene.movers))]
+    moved = (
+        replace(mover, times=told.times[own], points=told.positions[own])
+        for mover, own in zip(scene.movers, rows, strict=True)
+    )
+    return replace(scene, movers=tuple(moved))
+
+
 def kind_of(output: str | Path) -> str:
     """Ending of a file that a crowd can be written as.
 
@@ -208,6 +279,8 @@ def kind_of(output: str | Path) -> str:
         raise FileError(f"a crowd is written as {', '.join(f'*{ending}' for ending in OUTPUTS)}", path=output)
     if kind == ".parquet":
         check_parquet(output)
+    if kind in USD:
+        check_usd(output)
     check_place(output)
     return kind
 

@@ -134,6 +134,28 @@ def replacing(path: str | Path) -> Iterator[BinaryIO]:
         raise FileError(f"cannot be written: {error.strerror or error}", path=path) from error
 
 
+@contextmanager
+def replacing_path(path: str | Path) -> Iterator[Path]:
+    """Name a new file beside ``path``, of the same ending, for libraries that write by name; then as ``replacing``.
+
+    Raises
+    ------
+    FileError
+        The file system refuses (no such folder, no right, disk full). What was at ``path`` is untouched.
+    """
+    path = Path(path)
+    check_place(path)
+    temporary = path.with_name(f".{path.stem}.{token_hex(4)}.part{path.suffix}")
+    try:
+        try:
+            yield temporary
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot be written: {error.strerror or error}", path=path) from error
+
+
 def _beside(path: Path) -> Path:
     """Name of an unfinished file."""
     return path.with_name(f".{path.name}.{token_hex(4)}.part")

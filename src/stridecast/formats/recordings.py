@@ -6,17 +6,21 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from stridecast.body.conventions import to_motion, to_skeleton
 from stridecast.body.rig import RawRecording
-from stridecast.errors import FileError, SkeletonError
+from stridecast.errors import FileError, InputError, SkeletonError
+from stridecast.formats.amass import read_amass
 from stridecast.formats.amc import read_amc
 from stridecast.formats.asf import read_asf
 from stridecast.formats.bvh import read_bvh
+from stridecast.formats.c3d import read_c3d
 from stridecast.formats.files import looks_like, read_start
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
 
-RECORDINGS = {".bvh": "BVH", ".amc": "AMC with its ASF"}
+RECORDINGS = {".bvh": "BVH", ".amc": "AMC with its ASF", ".npz": "AMASS and other SMPL motion", ".c3d": "C3D"}
 """Suffixes of the recordings that ``load_motion`` reads, and what they are."""
 
 SKELETONS = {".bvh": "BVH", ".asf": "ASF"}
@@ -31,6 +35,7 @@ def load_motion(
     frame_rate: float | None = None,
     up: str | None = None,
     skeleton_path: str | Path | None = None,
+    body_model: str | Path | None = None,
     subject: str | None = None,
 ) -> Motion:
     """Load a recording.
@@ -38,7 +43,7 @@ def load_motion(
     Parameters
     ----------
     path
-        A BVH or AMC file, known by its suffix, else by its first words.
+        A BVH, AMC, AMASS (``.npz``) or C3D file, known by its suffix, else by its first words.
     roles
         Joints of the body whose names are unusual, role to joint name; the others are found by their names.
     scale
@@ -49,6 +54,9 @@ def load_motion(
         Axis that points up, ``"Y"`` or ``"Z"``. Left out: where the head is.
     skeleton_path
         The ASF of an AMC. Left out: ``07.asf`` beside ``07_01.amc``, else the only ASF in the folder.
+    body_model
+        A body model of SMPL, SMPL+H or SMPL-X as ``.npz``, which gives persons of AMASS their own skeletons. Left out:
+        a mean one.
     subject
         Who moves. Left out: ``07`` for ``07_01.bvh``, else the name of the folder.
 
@@ -70,7 +78,14 @@ def load_motion(
         A scale that is not positive, or an unknown axis.
     """
     return load_recording(
-        path, roles=roles, scale=scale, frame_rate=frame_rate, up=up, skeleton_path=skeleton_path, subject=subject
+        path,
+        roles=roles,
+        scale=scale,
+        frame_rate=frame_rate,
+        up=up,
+        skeleton_path=skeleton_path,
+        body_model=body_model,
+        subject=subject,
     )[0]
 
 
@@ -82,11 +97,22 @@ def load_recording(
     frame_rate: float | None = None,
     up: str | None = None,
     skeleton_path: str | Path | None = None,
+    body_model: str | Path | None = None,
     subject: str | None = None,
+    assumed_rate: float | None = None,
 ) -> tuple[Motion, tuple[str, ...]]:
-    """Load a recording as ``load_motion`` does, with notes of what was guessed, turned, dropped or added."""
+    """Load a recording as ``load_motion`` does, with notes of what was guessed, turned, dropped or added.
+
+    ``assumed_rate`` is taken where the file does not say its frame rate, while ``frame_rate`` overrides what it says.
+    """
     path = Path(path)
-    recording = _read(path, skeleton_path)
+    if scale is not None and not (np.isfinite(scale) and scale > 0):
+        raise InputError(f"the scale must be a positive number of metres per unit, not {scale}")
+    recording = _read(path, skeleton_path, body_model, scale)
+    if _is_c3d(path):
+        scale = None  # it has been used: regressions from skin to bone need metres
+    if recording.frame_rate is None and frame_rate is None:
+        frame_rate = assumed_rate
     try:
         return to_motion(
             recording,
@@ -115,8 +141,18 @@ def load_skeleton(path: str | Path, *, roles: Mapping[str, str] | None = None, s
         raise SkeletonError(f"{path}: {error}") from None
 
 
-def _read(path: Path, skeleton_path: str | Path | None) -> RawRecording:
+def _is_c3d(path: Path) -> bool:
+    return path.suffix.lower() == ".c3d"
+
+
+def _read(
+    path: Path, skeleton_path: str | Path | None, body_model: str | Path | None, scale: float | None
+) -> RawRecording:
     suffix = path.suffix.lower()
+    if _is_c3d(path):
+        return read_c3d(path, scale=scale)
+    if suffix == ".npz":
+        return read_amass(path, body_model=body_model)
     seems = looks_like(read_start(path)) if suffix not in RECORDINGS else ""
     if suffix == ".bvh" or "BVH" in seems:
         return read_bvh(path)

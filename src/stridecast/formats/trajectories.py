@@ -10,7 +10,7 @@ from stridecast.formats.files import looks_like, read_start
 from stridecast.formats.trajectory_rows import UNITS, checked_rate, text_of
 from stridecast.formats.trajectory_sqlite import read_jupedsim
 from stridecast.formats.trajectory_tables import read_csv, read_parquet, trajectories_of, write_csv, write_parquet
-from stridecast.formats.trajectory_text import kind_of, read_eth, read_juelich
+from stridecast.formats.trajectory_text import kind_of, read_eth, read_juelich, write_juelich
 from stridecast.model.trajectories import Trajectories
 
 __all__ = ["FORMATS", "load_trajectories", "save_trajectories", "trajectories_of"]
@@ -77,21 +77,27 @@ def load_trajectories(
 
 
 def save_trajectories(path: str | Path, trajectories: Trajectories) -> None:
-    """Write trajectories as ``.csv`` or ``.parquet``, columns ``id,time,x,y[,heading,speed]``.
+    """Write trajectories as ``.csv`` or ``.parquet``, columns ``id,time,x,y[,heading,speed]``, or Juelich's ``.txt``.
+
+    The text has ``id frame x y`` and the frame rate; PedPy's ``load_trajectory_from_txt`` reads it.
 
     Raises
     ------
     FileError
-        Another ending, or the file cannot be written; what was there is untouched.
+        Another ending, text of moments that are not at a steady rate, or the file cannot be written; what was there is
+        untouched.
     """
     ending = Path(path).suffix.lower()
     if ending == ".csv":
         write_csv(path, trajectories)
     elif ending == ".parquet":
         write_parquet(path, trajectories)
+    elif ending == ".txt":
+        write_juelich(path, trajectories)
     else:
         raise FileError(
-            f"trajectories are written as .csv or .parquet, not as {ending or 'a file without ending'}", path=path
+            f"trajectories are written as .csv, .parquet or .txt, not as {ending or 'a file without ending'}",
+            path=path,
         )
 
 

@@ -8,9 +8,10 @@ import re
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from stridecast.errors import FileError
+from stridecast.formats.files import replacing
 from stridecast.formats.trajectory_rows import UNITS, Rows, assemble, line_of, numbers_of, text_of
 from stridecast.model.trajectories import Trajectories
 
@@ -28,6 +29,9 @@ TOO_FAST = 12.0
 
 STEPS = (6, 10)
 """Annotations of ETH and UCY are so many frames apart, at 15 or 25 frames a second: ..."""
+
+SAME_MOMENT = 1e-6
+"""Times that are nearer to each other are one moment, seconds."""
 
 STEP = 0.4
 """... so many seconds."""
@@ -54,6 +58,51 @@ def read_juelich(path: str | Path, frame_rate: float | None, unit: str | None) -
     if unit is None:
         unit = _unit(path, text, rows)
     return assemble(path, rows, UNITS[unit])
+
+
+def write_juelich(path: str | Path, trajectories: Trajectories) -> None:
+    """Write Juelich's text, which PedPy and JPSvis read: comments, then ``id frame x y``, in the order of frames.
+
+    Raises
+    ------
+    FileError
+        The moments are not at a steady rate, or the file system refuses.
+    """
+    rate, frames = _frames_of(path, trajectories.times)
+    order = np.lexsort((trajectories.ids, frames))
+    columns = (
+        trajectories.ids[order].tolist(),
+        frames[order].tolist(),
+        trajectories.positions[order, 0].tolist(),
+        (0.0 - trajectories.positions[order, 1]).tolist(),
+    )
+    with replacing(path) as file:
+        file.write(f"# framerate: {rate:.10g}\n# id frame x/m y/m\n".encode())
+        for first in range(0, len(order), 1 << 16):
+            part = (column[first : first + (1 << 16)] for column in columns)
+            file.write("".join(f"{i} {frame} {x:.6f} {y:.6f}\n" for i, frame, x, y in zip(*part, strict=True)).encode())
+
+
+def _frames_of(path: str | Path, times: Float[Array, "rows"]) -> tuple[float, Int[Array, "rows"]]:
+    """Frame rate and frames of moments that are a whole number of frames apart."""
+    moments = np.unique(times)
+    steps = np.diff(moments)
+    steps = steps[steps > SAME_MOMENT]
+    if not len(steps):
+        return 1.0, np.round(times).astype(np.int64)
+    rate = 1.0 / float(np.median(steps))
+    whole = round(rate)
+    rate = float(whole) if whole and abs(rate - whole) < 1e-4 * whole else rate
+    frames = np.round(times * rate)
+    off = np.abs(frames / rate - times)
+    if off.max() > 0.02 / rate:
+        row = int(np.argmax(off))
+        raise FileError(
+            f"counts frames, but row {row} is at {times[row]:.6g} s, between two frames at {rate:.6g} a second; write "
+            ".csv or .parquet",
+            path=path,
+        )
+    return rate, frames.astype(np.int64)
 
 
 def read_eth(path: str | Path, frame_rate: float | None, metres: float) -> Trajectories:
