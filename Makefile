@@ -6,11 +6,12 @@ JOBS ?= auto
 BIN := .venv/bin
 STAMP := .venv/.installed
 
-.PHONY: help demo test check bench format clean
+.PHONY: help demo page test check bench format clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo     a character walks, turns, runs and stops: writes demo/"
+	@echo "make page     build the page anew after a change in web/"
 	@echo "make test     tests and examples"
 	@echo "make check    format, lint, types, layers"
 	@echo "make bench    how fast it is"
@@ -27,6 +28,9 @@ $(STAMP): pyproject.toml constraints.txt
 demo: $(STAMP)
 	$(BIN)/python examples/demo.py
 
+page: $(STAMP)
+	$(BIN)/python web/bundle.py build
+
 test: $(STAMP)
 	$(BIN)/python -m pytest -n $(JOBS)
 
@@ -35,6 +39,7 @@ check: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python web/bundle.py check
 
 bench: $(STAMP)
 	@if ls bench/*.py >/dev/null 2>&1; \
@@ -44,7 +49,8 @@ bench: $(STAMP)
 format: $(STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+	$(BIN)/python web/bundle.py format
 
 clean:
-	rm -rf .venv build dist demo .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .benchmarks
+	rm -rf .venv build dist demo web/node_modules src/stridecast/live/static .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .benchmarks
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
@@ -77,6 +78,16 @@ def pedpy() -> str:
     if not named and find_spec("pedpy") is None:
         absent("pedpy", "no PedPy in this Python, and STRIDECAST_PEDPY names no other")
     return named or sys.executable
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Path:
+    """The browser in which the page is tested: ``STRIDECAST_CHROMIUM``, or what is called chromium here."""
+    named = os.environ.get("STRIDECAST_CHROMIUM")
+    found = named or shutil.which("chromium") or shutil.which("chromium-browser")
+    if not found:
+        absent("chromium", "no chromium on this machine (STRIDECAST_CHROMIUM names another browser)")
+    return Path(str(found))
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import shapely
 
 import stridecast as sc
 from stridecast.crowd.crowd import Crowd
-from stridecast.errors import PathError, SceneError
+from stridecast.errors import InputError, PathError, SceneError
 from stridecast.model.behavior import Behavior
 from stridecast.model.people import Person, Wall
 from stridecast.model.scene import Circle, Polygon, Scene
@@ -105,3 +105,26 @@ def test_walls_are_kept_off_from_the_next_frame_on(database):
         frame = crowd.step()
         assert (shapely.distance(shapely.points(frame.positions), line) >= frame.radii - 1e-9).all()
     assert crowd.done
+
+
+def test_the_outlook_is_the_way_that_is_left_and_the_room_to_stop(database):
+    crowd = _walked(database, 60)
+    row = crowd.frame().ids.tolist().index(1)
+    ahead, here = crowd.outlook("Ann"), crowd.frame().positions[row]
+    assert np.allclose(ahead.way[0], here)
+    assert np.allclose(ahead.way[-1], [0.0, 12.0])
+    assert np.all(np.diff(ahead.way[:, 1]) >= 0)
+    steps = np.linalg.norm(np.diff(ahead.window, axis=0), axis=-1) * crowd.frame_rate
+    assert steps[0] == pytest.approx(np.linalg.norm(crowd.frame().velocities[row]), abs=0.2)
+    assert steps[-1] < 0.3
+    assert crowd.outlook(1).way.shape == ahead.way.shape
+    with pytest.raises(InputError, match="'Eve'"):
+        crowd.outlook("Eve")
+
+
+def test_who_comes_far_away_has_a_pose_at_once(database):
+    """Bodies beyond the levels of detail are stepped less often, but never shown as who was in their row before."""
+    crowd = Crowd(database, _scene(), lod=(1.0, 2.0))
+    frame = crowd.step(focus=(500.0, 500.0))
+    assert np.allclose(np.linalg.norm(frame.rotations, axis=-1), 1.0)
+    assert np.abs(frame.roots[:, [0, 2]] - frame.positions).max() < 0.3

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from stridecast.errors import FileError, InputError
@@ -336,6 +336,7 @@ def test_what_is_wrong_with_a_file_is_said_with_its_place(tmp_path, content, say
 
 
 @given(st.binary(max_size=300) | st.text("0123456789 .,;\n#ideframxyt-", max_size=200).map(str.encode))
+@example(b"\x1c")
 def test_any_bytes_are_read_or_refused_in_words(tmp_path_factory, content):
     path = written(tmp_path_factory.mktemp("any"), content)
     for kind in (None, *(f for f in FORMATS if f != "parquet")):

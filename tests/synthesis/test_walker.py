@@ -11,6 +11,7 @@ from stridecast.errors import DatabaseError, InputError, WishError
 from stridecast.geometry import ground
 from stridecast.model.pose import Pose
 from stridecast.steering.force import SteeringGains
+from stridecast.synthesis.sizes import enlargement
 from stridecast.synthesis.walker import Walker, Walkers
 from stridecast.synthesis.wishes import FARTHEST
 from walks import motions_of, points_of
@@ -309,3 +310,64 @@ def test_compiling_is_announced_not_silent(formulas, caplog, monkeypatch):
     with caplog.at_level(logging.WARNING, logger="stridecast"):
         Walker(formulas).step((0.0, 0.0))
     assert "compiling" in caplog.text
+
+
+# what plays, and how much of the turning may be used
+
+
+def test_what_plays_is_told_with_its_place_in_the_database(formulas):
+    walker = Walker(formulas)
+    names = [group.name for group in formulas.groups]
+    segments = 0
+    for frame in range(90):
+        pose = walker.step((0.0, 0.05 * frame))
+        playing = walker.playing
+        assert names[playing.group[0]] == pose.group
+        assert 0.0 <= playing.generic[0] <= 1.0
+        assert playing.segments[0] >= segments
+        segments = playing.segments[0]
+    assert segments > 3
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5, 0.1])
+def test_less_turning_makes_wider_ways(formulas, share):
+    """Never faster round than the share of what was learned; the bounds in force say so."""
+    walker = Walkers(formulas, np.zeros((2, 2)))
+    walker.limit_turning(share)
+    widest = max(group.bounds.lateral_per_speed for group in formulas.groups)
+    before, turned = 0.0, []
+    for frame in range(120):
+        point = (0.0, 0.05 * frame) if frame < 60 else (3.0 + 0.05 * (frame - 60), 3.0)
+        pose = walker.step(np.tile(point, (2, 1)))
+        heading, speed = float(pose.vehicle.heading[0]), float(np.hypot(*pose.vehicle.velocity[0]))
+        if speed > 0.5 and "stand" not in pose.motion[0]:
+            turned.append(abs(heading - before) * 30)
+            assert turned[-1] <= share * widest * 1.25 + 0.02
+        before = heading
+    assert max(turned) > 0.4 * share * widest
+
+
+def test_a_share_that_is_none_is_refused(formulas):
+    walker = Walker(formulas)
+    for share in (0.0, -1.0, 1.01, float("nan")):
+        with pytest.raises(InputError, match="share of the turning"):
+            walker.limit_turning(share)
+
+
+def test_gains_are_changed_while_walking(formulas):
+    far = []
+    for half_life in (0.15, 0.6):
+        walker = Walker(formulas)
+        walker.gains = SteeringGains(half_life=half_life)
+        for frame in range(90):
+            pose = walker.step((0.0, 0.04 * frame))
+        far.append(0.04 * 89 - pose.vehicle.position[1])
+    assert far[0] < far[1]
+
+
+def test_what_larger_movements_add_is_worked_out_once(formulas):
+    first, other = Walker(formulas, size="lively"), Walker(formulas)
+    for walker in (first, other):
+        walker.step((0.0, 1.0), size="exaggerated")
+    assert first._batch._tables.larger is other._batch._tables.larger
+    assert np.allclose(first._batch._tables.larger, enlargement(formulas), atol=1e-5)

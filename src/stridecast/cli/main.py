@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from stridecast.cli import build, crowd, dress, fetch, mine, samples, score, show, walk
+from stridecast.cli import build, crowd, dress, fetch, live, mine, samples, score, show, walk
 from stridecast.errors import InputError
 
 
@@ -30,6 +30,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command("demo")(live.demo)
+app.command("live")(live.live)
 app.command("build")(build.build)
 app.command("show")(show.show)
 app.command("mine")(mine.mine)

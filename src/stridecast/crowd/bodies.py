@@ -66,6 +66,7 @@ class Bodies:
         self.scales = np.ones(0)
         self._pools: list[Walkers] = []
         self._waited = np.zeros(0, np.int64)
+        self._new = np.zeros(0, np.bool_)
         self._offsets = np.zeros((0, 2))
 
     def place(
@@ -83,7 +84,7 @@ class Bodies:
         while len(rows) and rows.max() >= len(self.roots):
             self._grow()
         self.scales[rows] = heights / self.height
-        self._waited[rows] = 0
+        self._waited[rows], self._new[rows] = 0, True
         for pool, inside in self._split(rows):
             own = rows[inside] - pool * POOL
             scaled = positions[inside] / self.scales[rows[inside], None]
@@ -103,10 +104,10 @@ class Bodies:
         """Step the bodies in rows; ``vehicles`` and the rest have a row each.
 
         ``levels`` tell of each body in how many frames it is stepped once, 1 to ``LEVELS``; in between it moves with
-        its vehicle as it is.
+        its vehicle as it is. Who is new is stepped at once, as there is no pose to be kept.
         """
         self._waited[rows] += 1
-        due = np.ones(len(rows), np.bool_) if levels is None else self._waited[rows] >= levels
+        due = np.ones(len(rows), np.bool_) if levels is None else (self._waited[rows] >= levels) | self._new[rows]
         late = rows[~due]
         for pool, inside in self._split(rows):
             own = rows[inside] - pool * POOL
@@ -138,7 +139,7 @@ class Bodies:
             self.rotations[to] = pose.rotations[fresh]
             self.planted[to] = pose.planted[fresh]
         done = rows[due]
-        self._waited[done] = 0
+        self._waited[done], self._new[done] = 0, False
         self._offsets[done] = self.roots[done][:, [0, 2]] - vehicles.position[due]
         if len(late):
             moved = vehicles.position[~due] + self._offsets[late]
@@ -153,7 +154,7 @@ class Bodies:
             Walkers(self.database, np.zeros((POOL, 2)), frame_rate=self.frame_rate, threads=self.threads)
         )
         more = POOL * len(self._pools)
-        for name in ("roots", "rotations", "planted", "scales", "_waited", "_offsets"):
+        for name in ("roots", "rotations", "planted", "scales", "_waited", "_new", "_offsets"):
             old = getattr(self, name)
             new = np.zeros((more, *old.shape[1:]), old.dtype)
             new[: len(old)] = old

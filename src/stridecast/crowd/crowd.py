@@ -12,7 +12,7 @@ from jaxtyping import Bool, Int
 
 from stridecast.crowd.bodies import LEVELS, Bodies, motions_of, scaled_to, stature
 from stridecast.crowd.bounds import HumanBounds
-from stridecast.crowd.explanation import Explanation, explanation_of
+from stridecast.crowd.explanation import Explanation, Outlook, explanation_of
 from stridecast.crowd.frame import CrowdFrame
 from stridecast.crowd.ground import ground_of
 from stridecast.crowd.newcomers import chance_of, newcomer_of, obstacle_of, slots_of, walker_of
@@ -265,6 +265,30 @@ class Crowd:
             float(m.contact[row]),
             float(m.chosen_side[row]),
             bool(m.held[row]),
+        )
+
+    def outlook(self, who: int | str) -> Outlook:
+        """Where somebody is about to be: the way that is left, and the room that they have reserved.
+
+        Parameters
+        ----------
+        who
+            Number or name.
+
+        Raises
+        ------
+        InputError
+            Nobody of that number or name is there.
+        """
+        row = self._row_of(who)
+        m = self._traffic.moving
+        other = int(m.other[row])
+        is_person = other >= 0 and not self._traffic.people.scripted[other]
+        return Outlook(
+            way=self._traffic.way_left(row),
+            window=m.path[row, : m.stops[row]].copy(),
+            target=m.target[row].copy(),
+            other=int(self._ids[other]) if is_person else None,
         )
 
     def person(self, number: int) -> Person:

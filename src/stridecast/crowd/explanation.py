@@ -4,7 +4,34 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from jaxtyping import Float
+
 from stridecast.crowd.rules import RULES, WHY
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outlook:
+    """Where somebody is about to be.
+
+    Parameters
+    ----------
+    way
+        From where they are to their last stop, metres; the place alone where they stand for good.
+    window
+        Where they would be, frame by frame, if they braked from now on: what is reserved, and nobody else enters.
+    target
+        Velocity that they aim at, m/s.
+    other
+        Number of whom their rule is about, if that is somebody.
+    """
+
+    way: Float[Array, "points 2"]
+    window: Float[Array, "frames 2"]
+    target: Float[Array, "2"]
+    other: int | None
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -142,6 +142,12 @@ class Traffic:
         self.moving.place[row] = 0.0
         self.ways = Ways(points=np.concatenate((self.ways.points, way)), along=np.concatenate((self.ways.along, along)))
 
+    def way_left(self, row: int) -> Float[Array, "points 2"]:
+        """The way from where somebody is to its end."""
+        first, count = int(self.people.first[row]), int(self.people.points[row])
+        ahead = self.ways.along[first : first + count] > self.moving.place[row]
+        return np.concatenate((self.moving.position[row : row + 1], self.ways.points[first : first + count][ahead]))
+
     def passed(self, row: int, stops: Float[Array, "stops 2"]) -> int:
         """How many of the stops on somebody's way lie behind them."""
         first, count = int(self.people.first[row]), int(self.people.points[row])

@@ -105,7 +105,7 @@ def toe_off(group: MotionGroup) -> int | None:
     return next((k for k, (now, then) in enumerate(pairwise(stands)) if now and not then), None)
 
 
-def _followers(database: MotionDatabase) -> dict[int, int]:
+def followers(database: MotionDatabase) -> dict[int, int]:
     """Which example follows which in its take."""
     examples = database.examples
     order = np.lexsort((examples.first_frames, examples.mirrored, examples.takes))
@@ -119,7 +119,7 @@ def _followers(database: MotionDatabase) -> dict[int, int]:
 
 def _cycles(database: MotionDatabase, group_of: Int[Array, "examples"]) -> list[tuple[int, ...]]:
     """Pairs of half cycles, the one with the right toe-off first; pieces of standing by themselves."""
-    groups, follows = database.groups, _followers(database)
+    groups, follows = database.groups, followers(database)
     cadence = database.annotations.cadence
     human = (cadence >= STEPS[0]) & (cadence <= STEPS[1])
     out: list[tuple[int, ...]] = []
@@ -166,7 +166,7 @@ def _of_motion(groups: Sequence[MotionGroup], motion: str) -> list[int]:
 
 def _transitions(database: MotionDatabase, group_of: Int[Array, "examples"]) -> list[tuple[int, ...]]:
     """Rows of examples of one transition; those cut by the end of a take only where none is whole."""
-    groups, follows = database.groups, _followers(database)
+    groups, follows = database.groups, followers(database)
     precedes = {after: before for before, after in follows.items()}
     motions = [groups[number].motion for number in group_of]
     told = database.annotations

@@ -165,6 +165,33 @@ def perform(
     return _with_planted_feet(free)
 
 
+def recorded(database: MotionDatabase, rows: Sequence[int]) -> Performance:
+    """Examples of one take, one after the other, as they were recorded: nothing closed, no foot put.
+
+    Parameters
+    ----------
+    rows
+        Places of the examples in the tables, each the next in its take.
+    """
+    columns, one = np.array(rows, np.int64)[None], np.ones(1)
+    times, features, ways = _blended(database, columns, one)
+    begins = np.concatenate(([0.0], np.cumsum([t[LAST] - t[FIRST] for t in times])))
+    knots = np.concatenate([b + t[FIRST:LAST] for b, t in zip(begins, times, strict=False)] + [begins[-1:]])
+    table = np.concatenate([f[FIRST:LAST] for f in features] + [features[-1][LAST : LAST + 1]])
+    table[:, -1] = np.unwrap(table[:, -1])
+    return Performance(
+        skeleton=database.skeleton,
+        references=database.references,
+        seconds=float(begins[-1]),
+        repeats=False,
+        features=CubicSpline(knots, table),
+        way=CubicSpline(knots, _joined(ways)),
+        contacts=(),
+        speed=0.0,
+        turn=0.0,
+    )
+
+
 def _blended(
     database: MotionDatabase, rows: Int[Array, "clips examples"], weights: Float[Array, "clips"]
 ) -> tuple[list[Array], list[Array], list[Array]]:

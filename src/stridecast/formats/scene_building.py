@@ -40,7 +40,7 @@ class SceneBuilder:
         The first thing that makes no scene.
     """
 
-    def __init__(self, path: str | Path, lines: dict[Place, int]) -> None:
+    def __init__(self, path: str | Path | None, lines: dict[Place, int]) -> None:
         self.path = path
         self.lines = lines
         self.names: set[str] = set()

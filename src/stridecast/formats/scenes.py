@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from stridecast.errors import FileError
 from stridecast.formats.files import replacing
 from stridecast.formats.scene_building import SceneBuilder, written
 from stridecast.formats.scene_parts import ScenePart, known_keys, place_of
-from stridecast.formats.yaml_values import Place, line_of, named, read_values
+from stridecast.formats.yaml_values import Place, line_of, named, read_values, values_of
 from stridecast.model.scene import Scene
 
 
@@ -34,11 +34,58 @@ def load_scene(path: str | Path) -> Scene:
         ``obstacles[2].radius``.
     """
     values, lines = read_values(path)
+    return SceneBuilder(path, lines).scene(_checked(values, path, lines))
+
+
+def parse_scene(text: str, name: str = "scene.yaml") -> Scene:
+    """Read a scene that is at hand as text; ``name`` is what messages call it.
+
+    Raises
+    ------
+    FileError
+        As of ``load_scene``.
+    """
+    values, lines = values_of(text, name)
+    return SceneBuilder(name, lines).scene(_checked(values, name, lines))
+
+
+def scene_of(values: Mapping[str, Any]) -> Scene:
+    """The scene of what a scene file says, as lists, dictionaries, numbers and names.
+
+    Raises
+    ------
+    FileError
+        As of ``load_scene``; the place is named, and no file.
+    """
+    return SceneBuilder(None, {}).scene(_checked(values, None, {}))
+
+
+def is_empty(values: Mapping[str, Any]) -> bool:
+    """Whether what a scene file says is right so far, but nobody is there.
+
+    Raises
+    ------
+    FileError
+        It is not right, as far as that can be told without anybody in it.
+    """
+    part = _checked(values, None, {})
+    empty = not (part.people or part.sources or part.start is not None or part.goals is not None)
+    if empty:
+        somebody = part.model_copy(update={"start": (0.0, 0.0), "goals": [(0.0, 1.0)]})
+        SceneBuilder(None, {}).scene(somebody)
+    return empty
+
+
+def scene_values(scene: Scene) -> dict[str, Any]:
+    """What the file of a scene says, as lists, dictionaries, numbers and names; ``scene_of`` reads it."""
+    return written(scene)
+
+
+def _checked(values: Any, path: str | Path | None, lines: dict[Place, int]) -> ScenePart:
     try:
-        part = ScenePart.model_validate(values)
+        return ScenePart.model_validate(values)
     except ValidationError as error:
         raise _refusal(path, error, lines) from None
-    return SceneBuilder(path, lines).scene(part)
 
 
 _BREAKS = ("\x85", "\u2028", "\u2029")
@@ -53,11 +100,15 @@ def save_scene(path: str | Path, scene: Scene) -> None:
     FileError
         The file cannot be written; what was there is untouched.
     """
+    with replacing(path) as file:
+        file.write(scene_text(scene).encode())
+
+
+def scene_text(scene: Scene) -> str:
+    """A scene as YAML, which ``parse_scene`` reads to the last bit; what is as usual is left out."""
     kept = written(scene)
     told = any(mark in text for mark in _BREAKS for text in _texts(kept))
-    text = yaml.dump(kept, Dumper=_Dumper, default_flow_style=None, sort_keys=False, allow_unicode=not told, width=118)
-    with replacing(path) as file:
-        file.write(text.encode())
+    return yaml.dump(kept, Dumper=_Dumper, default_flow_style=None, sort_keys=False, allow_unicode=not told, width=118)
 
 
 def scene_schema() -> dict[str, Any]:
@@ -82,7 +133,7 @@ def _texts(value: Any) -> Iterator[str]:
             yield from _texts(part)
 
 
-def _refusal(path: str | Path, error: ValidationError, lines: dict[Place, int]) -> FileError:
+def _refusal(path: str | Path | None, error: ValidationError, lines: dict[Place, int]) -> FileError:
     """The first of the complaints, in words, with its place."""
     found = error.errors(include_url=False, include_context=True)
     first = min(found, key=lambda e: line_of(lines, place_of(e["loc"])) or 0)

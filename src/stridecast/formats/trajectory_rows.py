@@ -146,6 +146,7 @@ def numbers_of(
     for _ in range(skip):
         next(lines, None)
     places = list(columns.values())
+    lines = filter(str.strip, lines)  # separators of files and groups are blank as text, not as bytes
     head = next(lines, None)
     if head is None:
         raise FileError("holds nobody: there are no rows", path=path)

@@ -38,7 +38,17 @@ def read_values(path: str | Path) -> tuple[Any, dict[Place, int]]:
     FileError
         The file cannot be read, or is no YAML or none that is taken; with the line.
     """
-    text = _text(path)
+    return values_of(_text(path), path)
+
+
+def values_of(text: str, path: str | Path) -> tuple[Any, dict[Place, int]]:
+    """The same of text; ``path`` is what messages call it.
+
+    Raises
+    ------
+    FileError
+        As of ``read_values``.
+    """
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     lines: dict[Place, int] = {}
     builder = _Builder(path, lines)

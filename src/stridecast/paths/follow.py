@@ -69,6 +69,36 @@ class PathWalk:
     arrived: bool
 
 
+class Guide:
+    """Leads a walker along a curve as planned, frame by frame.
+
+    Parameters
+    ----------
+    curve, plan
+        The way, and how fast to go.
+    """
+
+    def __init__(self, curve: Curve, plan: SpeedPlan) -> None:
+        self.curve, self.plan = curve, plan
+        self.place = 0.0
+
+    @property
+    def behavior(self) -> Behavior:
+        """How to go here."""
+        return self.plan.behavior_at(self.place)
+
+    def wish(self, position: Float[Array, "2"], velocity: Float[Array, "2"]) -> tuple[Float[Array, "2"], float, str]:
+        """What to ask a walker for who is here: acceleration, seconds until the end, and the motion."""
+        return _wish(self.curve, self.plan, self.place, position, velocity)
+
+    def see(self, pose: Pose) -> bool:
+        """Take note of where the walker is now; whether it has come to rest at the end."""
+        position, velocity = pose.vehicle.position, pose.vehicle.velocity
+        self.place = _place(self.curve, position, self.place)
+        slow = float(np.hypot(*velocity)) < 0.02
+        return self.curve.length - self.place < 0.25 and slow and pose.motion == "stand"
+
+
 def walk_scene(
     database: MotionDatabase,
     scene: Scene,
@@ -148,18 +178,17 @@ def walk_along(
     most = int(PATIENCE * expected + 10 * rate)
     poses: list[Pose] = []
     places: list[float] = []
-    place, velocity, position, resting = 0.0, np.zeros(2), curve.points[0], 0
+    guide = Guide(curve, plan)
+    velocity, position, resting = np.zeros(2), curve.points[0], 0
     while len(poses) < most and resting < PAUSE * rate:
-        acceleration, rests_in, motion = _wish(curve, plan, place, position, velocity)
-        here = plan.behavior_at(place)
+        acceleration, rests_in, motion = guide.wish(position, velocity)
+        here = guide.behavior
         how = {"size": size or here.size, "style": here.style if style is None else style}
         pose = walker.step(acceleration=acceleration, rests_in=rests_in, motion=motion, **how)  # type: ignore[arg-type]
         position, velocity = pose.vehicle.position, pose.vehicle.velocity
-        place = _place(curve, position, place)
+        resting = resting + 1 if guide.see(pose) else 0
         poses.append(pose)
-        places.append(place)
-        arrived = curve.length - place < 0.25 and float(np.hypot(*velocity)) < 0.02 and pose.motion == "stand"
-        resting = resting + 1 if arrived else 0
+        places.append(guide.place)
         if progress is not None and len(poses) % int(rate) == 0:
             progress(min(len(poses), expected), expected)
     if progress is not None:

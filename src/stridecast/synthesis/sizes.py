@@ -9,7 +9,9 @@ movements, less for lively ones, a negative one for calm ones.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from threading import Lock
 from types import MappingProxyType
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -47,6 +49,21 @@ FADE = 0.15
 """What a stance does to the movement of a foot is forgotten within this part of a half cycle."""
 
 GENERIC = np.clip(np.arange(-MARGIN, INTERVALS + MARGIN + 1) / INTERVALS, 0.0, 1.0)
+
+
+_LOCK = Lock()
+_KEPT: WeakKeyDictionary[MotionDatabase, Array] = WeakKeyDictionary()
+
+
+def kept_enlargement(database: MotionDatabase) -> Float[Array, "examples rows features"]:
+    """``enlargement`` in single precision, worked out once for all walkers of a database: it takes a second or more.
+
+    Walkers share it, and nobody writes into it.
+    """
+    with _LOCK:
+        if database not in _KEPT:
+            _KEPT[database] = enlargement(database).astype(np.float32)
+        return _KEPT[database]
 
 
 def enlargement(database: MotionDatabase) -> Float[Array, "examples rows features"]:

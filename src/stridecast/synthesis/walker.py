@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -16,7 +17,7 @@ from stridecast.model.pose import BoundsInForce, Pose, VehicleState
 from stridecast.model.segment import MOTIONS
 from stridecast.steering.force import SteeringGains
 from stridecast.steering.kernels import JERK, LATERAL, SPEED, TANGENTIAL
-from stridecast.synthesis.sizes import enlargement
+from stridecast.synthesis.sizes import kept_enlargement
 from stridecast.synthesis.state import make_state
 from stridecast.synthesis.step_kernels import GIVEN, PLAN, POINT, Given, step_block
 from stridecast.synthesis.styles import Style, style_numbers
@@ -37,6 +38,18 @@ _NAMES = tuple(
 
 BLOCK = 64
 """Characters a thread steps at a time."""
+
+
+LEAST_TURNING = 0.05
+"""Somebody who may not turn at all could not follow anything: the least share of the turning that was learned."""
+
+
+class Playing(NamedTuple):
+    """What plays, of each character: place of the group in the database, generic time (0 to 1), segments begun."""
+
+    group: Int[Array, "characters"]
+    generic: Float[Array, "characters"]
+    segments: Int[Array, "characters"]
 
 
 class Walkers:
@@ -136,6 +149,30 @@ class Walkers:
     def made_up(self) -> int:
         """Transitions so far for which the database had no example, so that poses were blended over instead."""
         return self._made_up_before + int(self._state.made_up.sum())
+
+    @property
+    def playing(self) -> Playing:
+        """Which group plays, how far it is, and how many segments have begun."""
+        s = self._state
+        return Playing(group=s.group.copy(), generic=np.minimum(s.generic, 1.0), segments=s.segments.copy())
+
+    def limit_turning(self, share: float) -> None:
+        """Let everybody use only so much of the turning that was learned, from the next frame on (KS07's slide bars).
+
+        Parameters
+        ----------
+        share
+            Of the greatest lateral acceleration, ``LEAST_TURNING`` to 1.
+
+        Raises
+        ------
+        InputError
+            Another share. Nothing has changed then.
+        """
+        if not LEAST_TURNING <= share <= 1.0:
+            raise InputError(f"the share of the turning must lie between {LEAST_TURNING} and 1, not at {share}")
+        learned = np.array([group.bounds.lateral_per_speed for group in self.database.groups])
+        self._tables = self._tables._replace(lateral_per_speed=share * learned)
 
     def place(
         self,
@@ -270,7 +307,7 @@ class Walkers:
 
     def _enlarge_if(self, sizes: list[float]) -> None:
         if any(sizes) and not len(self._tables.larger):
-            self._tables = self._tables._replace(larger=enlargement(self.database).astype(np.float32))
+            self._tables = self._tables._replace(larger=kept_enlargement(self.database))
 
     def _advance(self) -> None:
         if not step_block.signatures and not is_compiled(step_block):
@@ -374,8 +411,21 @@ class Walker:
 
     @property
     def gains(self) -> SteeringGains:
-        """Spring and damper between vehicle and point."""
+        """Spring and damper between vehicle and point; others act from the next frame on."""
         return self._batch.gains
+
+    @gains.setter
+    def gains(self, gains: SteeringGains) -> None:
+        self._batch.gains = gains
+
+    @property
+    def playing(self) -> Playing:
+        """Which group plays, how far it is, and how many segments have begun; arrays of one."""
+        return self._batch.playing
+
+    def limit_turning(self, share: float) -> None:
+        """Use only so much of the turning that was learned; see ``Walkers.limit_turning``."""
+        self._batch.limit_turning(share)
 
     @property
     def motions(self) -> tuple[str, ...]:

@@ -1,0 +1,92 @@
+"""What all sessions of a server share: the database, the first scene, and who is there."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from stridecast.live.downloads import Download, Downloads
+from stridecast.live.messages import LimitsPart
+from stridecast.live.uploads import Uploads
+from stridecast.model.database import MotionDatabase
+
+MOST_SESSIONS = 8
+"""So many clients are served at once."""
+
+BUNDLE = Path(__file__).parent / "static"
+"""Where the page lies."""
+
+
+class Guest(NamedTuple):
+    """What a session keeps in files."""
+
+    folder: Path
+    uploads: Uploads
+    downloads: Downloads
+
+
+@dataclass(kw_only=True, eq=False)
+class Hall:
+    """What is shared.
+
+    Parameters
+    ----------
+    database, name
+        What walkers have learned, and how it is called.
+    scene
+        The scene that sessions begin with, as its file says it.
+    limits
+        What is taken of each client.
+    most_sessions
+        So many clients are served at once.
+    threads
+        Threads that share the people of a crowd.
+    bundle
+        Folder of the page.
+    """
+
+    database: MotionDatabase
+    name: str = "sample database"
+    scene: Mapping[str, Any] = field(default_factory=lambda: {"version": 1})
+    limits: LimitsPart
+    most_sessions: int = MOST_SESSIONS
+    threads: int = field(default_factory=lambda: max(1, min(4, (os.cpu_count() or 1))))
+    bundle: Path = BUNDLE
+    guests: dict[str, Guest] = field(default_factory=dict)
+    _folder: tempfile.TemporaryDirectory[str] | None = None
+
+    @property
+    def full(self) -> bool:
+        """Whether nobody more is let in."""
+        return len(self.guests) >= self.most_sessions
+
+    def enter(self) -> str:
+        """Let somebody in; the word by which the session is known, and which nobody can guess."""
+        if self._folder is None:  # readable for its owner only
+            self._folder = tempfile.TemporaryDirectory(prefix="stridecast-live-")
+        folder = Path(self._folder.name, secrets.token_hex(8))
+        word = secrets.token_urlsafe(24)
+        self.guests[word] = Guest(folder, Uploads(folder / "files", self.limits), Downloads(folder / "made"))
+        return word
+
+    def leave(self, word: str) -> None:
+        """Remove what a session leaves behind."""
+        guest = self.guests.pop(word)
+        shutil.rmtree(guest.folder, ignore_errors=True)
+
+    def find(self, word: str) -> Download | None:
+        """A file that was made for somebody who is there."""
+        found = (guest.downloads.find(word) for guest in self.guests.values())
+        return next((file for file in found if file is not None), None)
+
+    def close(self) -> None:
+        """Remove all that was made."""
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None

@@ -1,0 +1,56 @@
+"""A scene as the client has it: checked, compared with what plays, small enough to be played live."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from stridecast.errors import SceneError
+from stridecast.formats.scenes import is_empty, scene_of
+from stridecast.live.limits import FASTEST_FLOW, MOST_LIVE
+from stridecast.model.scene import Scene
+
+PLACE = ("roads", "obstacles", "walls")
+"""Parts that change while people walk; another change begins anew."""
+
+_PLACE = re.compile(r"((?:[a-z_]+(?:\[\d+\])*)(?:\.[a-z_]+(?:\[\d+\])*)*): ")
+
+
+def read_scene(values: Mapping[str, Any]) -> Scene | None:
+    """The scene of a document, nothing where nobody is there yet.
+
+    Raises
+    ------
+    FileError
+        It makes no scene; the place is named.
+    SceneError
+        More people than can be played live.
+    """
+    if is_empty(values):
+        return None
+    scene = scene_of(values)
+    there = len(scene.people) + sum(source.at_once for source in scene.sources) + scene.has_walker
+    if there > MOST_LIVE:
+        raise SceneError(
+            f"{there} people are there at once; {MOST_LIVE} are the most here (stridecast crowd takes more)"
+        )
+    flow = sum(source.flow for source in scene.sources)
+    if flow > FASTEST_FLOW:
+        raise SceneError(f"{flow:g} people a second come; {FASTEST_FLOW:g} are the most here")
+    return scene
+
+
+def place_in(message: str) -> tuple[str, str]:
+    """Split ``people[2].start: should be ...`` into the place and the words; no place where there is none."""
+    found = _PLACE.match(message)
+    return (found[1], message[found.end() :]) if found else ("", message)
+
+
+def only_the_place_differs(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether two documents have the same people, sources, movers and all else."""
+
+    def rest(values: Mapping[str, Any]) -> dict[str, Any]:
+        return {name: value for name, value in values.items() if name not in PLACE and value not in (None, [], {})}
+
+    return rest(one) == rest(other)
