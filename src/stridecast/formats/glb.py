@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from stridecast.body.mannequin import mannequin
-from stridecast.errors import InputError
+from stridecast.errors import FileError, InputError
 from stridecast.formats.glb_figure import Figure, Keys, plants
 from stridecast.formats.gltf import GltfWriter
 from stridecast.model.mesh import SkinnedMesh
@@ -28,6 +28,18 @@ Planted = Bool[Array, "frames 2"]
 
 ALIKE = 1e-6
 """Bodies whose bones are alike to this share of their length are one body in different sizes."""
+
+
+def check_compact(path: str | Path, compact: bool) -> None:
+    """Refuse ``compact`` for what is no GLB.
+
+    Raises
+    ------
+    FileError
+        The file has another ending.
+    """
+    if compact and Path(path).suffix.lower() != ".glb":
+        raise FileError("only *.glb is written compactly", path=path)
 
 
 def body_glb(skeleton: Skeleton, *, mesh: SkinnedMesh | None = None) -> bytes:
@@ -197,10 +209,8 @@ class GlbCrowd:
 
 
 def _head(roots: Sequence[int]) -> Mapping[str, object]:
-    from stridecast import __version__
-
     scene: dict[str, object] = {"nodes": list(roots)} if roots else {}
-    return {"asset": {"version": "2.0", "generator": f"stridecast {__version__}"}, "scene": 0, "scenes": [scene]}
+    return {"asset": {"version": "2.0", "generator": "stridecast"}, "scene": 0, "scenes": [scene]}
 
 
 def _provenance(motion: Motion) -> dict[str, Any]:
