@@ -90,6 +90,17 @@ def chromium() -> Path:
     return Path(str(found))
 
 
+@pytest.fixture(scope="session")
+def khronos() -> str:
+    """Node, with Khronos' glTF validator in ``tests/node``, which is installed when it is first asked for."""
+    from glbs import install
+
+    node = install()
+    if node is None:
+        absent("node", "no node on this machine, or no network for the package in tests/node")
+    return str(node)
+
+
 @pytest.fixture
 def unchecked() -> Iterator[None]:
     """Switch the type checks off, to see what the package itself says to arrays of the wrong shape."""

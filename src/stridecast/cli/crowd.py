@@ -22,7 +22,7 @@ def crowd(
         typer.Option(
             "--output",
             "-o",
-            metavar="OUT.csv|.parquet|.bvh|.usd[a|c]",
+            metavar="OUT.csv|.parquet|.bvh|.glb|.usd[a|c]",
             help="Where everybody was; with a BVH for each (OUT.NAME.bvh, OUT.people.csv), or one USD scene of all.",
             show_default=False,
         ),
@@ -37,6 +37,9 @@ def crowd(
     seed: Annotated[int | None, typer.Option(metavar="N", help="Of all chance; else that of the scene.")] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Frames a second; else the database's.")] = None,
     threads: Annotated[int, typer.Option(metavar="N", help="Threads; the result does not depend on it.")] = 1,
+    compact: Annotated[
+        bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
@@ -56,7 +59,7 @@ def crowd(
     if seed is not None and not 0 <= seed < 2**32:
         raise InputError(f"--seed must be a whole number from 0 to {2**32 - 1}, not {seed}")
     place = load_scene(scene)
-    files = CrowdFiles(output, movers=len(place.movers))
+    files = CrowdFiles(output, movers=len(place.movers), compact=compact)
     learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {"ways": "finding ways", "bake": "walking"}) as progress:
         people = Crowd(
@@ -76,7 +79,9 @@ def crowd(
                     for one in baked.finished:
                         if one.motion is not None:
                             height = people.height(one.number)
-                            files.add_motion(one.number, one.person.name, one.start, one.motion, height)
+                            files.add_motion(
+                                one.number, one.person.name, one.start, one.motion, height, planted=one.planted
+                            )
                     done = baking.tally.frames
                     progress("bake", done, done if baked.last else baking.frames)
         finally:

@@ -28,7 +28,7 @@ def dress(
         typer.Option(
             "--output",
             "-o",
-            metavar="OUT.bvh|.usd[a|c]|.csv|.parquet",
+            metavar="OUT.bvh|.glb|.usd[a|c]|.csv|.parquet",
             help="A BVH for each person (OUT.ID.bvh, OUT.people.csv), or one USD scene; or only where they were.",
             show_default=False,
         ),
@@ -48,6 +48,9 @@ def dress(
     height: Annotated[float | None, typer.Option(metavar="M", help="Of all bodies; else that of the database.")] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Frames a second; else the database's.")] = None,
     threads: Annotated[int, typer.Option(metavar="N", help="Threads; the result does not depend on it.")] = 1,
+    compact: Annotated[
+        bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a report as JSON.")] = False,
 ) -> None:
@@ -64,7 +67,7 @@ def dress(
 
     if threads < 1:
         raise InputError(f"at least 1 thread is needed, not {threads}")
-    files = CrowdFiles(output)
+    files = CrowdFiles(output, compact=compact)
     if trajectories.absolute() in {path.absolute() for path in files.files}:
         raise FileError("would be overwritten by the result; name another output", path=trajectories)
     with screen.progress(quiet, {}):  # for what the package has to say about the file
@@ -108,7 +111,7 @@ def _write(files: CrowdFiles, one: DressedPerson, height: float, rate: float) ->
     files.add_rows(ids, times, v.position, np.asarray(v.heading), np.linalg.norm(v.velocity, axis=-1))
     file = None
     if one.motion is not None:
-        file = str(files.add_motion(one.person, str(one.person), one.start, one.motion, height))
+        file = str(files.add_motion(one.person, str(one.person), one.start, one.motion, height, planted=one.planted))
     return {"person": one.person, "start": one.start, "frames": one.frames, "file": file, **asdict(one.report)}
 
 

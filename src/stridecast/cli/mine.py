@@ -44,8 +44,13 @@ def mine(
     seconds: Annotated[float | None, typer.Option(metavar="S", help="So long, instead.")] = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="OUT.bvh|.usd[a|c]", help="The motion to write.", show_default=False),
+        typer.Option(
+            "--output", "-o", metavar="OUT.bvh|.glb|.usd[a|c]", help="The motion to write.", show_default=False
+        ),
     ] = None,
+    compact: Annotated[
+        bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
 ) -> None:
@@ -59,7 +64,7 @@ def mine(
     from stridecast.formats.motion_files import check_motion_place, write_motion
 
     if output is not None:
-        check_motion_place(output)
+        check_motion_place(output, compact=compact)
     wish = {name: _number(name, text) for name, text in (("speed", speed), ("turn", turn), ("style", style))}
     learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {}):
@@ -75,7 +80,7 @@ def mine(
             seconds=seconds,
         )
     if output is not None:
-        write_motion(output, mined.motion)
+        write_motion(output, mined.motion, planted=mined.planted, compact=compact)
     if as_json:
         screen.print_json(_as_json(mined, output))
     elif not quiet:

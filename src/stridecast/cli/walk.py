@@ -34,7 +34,9 @@ def walk(
     database: Database = None,
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", metavar="OUT.bvh|.usd[a|c]", help="The motion to write.", show_default=False),
+        typer.Option(
+            "--output", "-o", metavar="OUT.bvh|.glb|.usd[a|c]", help="The motion to write.", show_default=False
+        ),
     ] = None,
     points: Annotated[
         Path | None, typer.Option("--input", metavar="POINTS.csv", help="Samples to follow: time,x,z[,motion].")
@@ -75,6 +77,9 @@ def walk(
     vmc: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Play it in real time to a receiver of the VMC protocol.")
     ] = None,
+    compact: Annotated[
+        bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
+    ] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
@@ -98,7 +103,7 @@ def walk(
     from stridecast.formats.trace import trace_text
 
     if output is not None:
-        check_motion_place(output)
+        check_motion_place(output, compact=compact)
     if trace is not None:
         check_place(trace)
     sender = None if vmc is None else _sender(vmc)
@@ -123,7 +128,7 @@ def walk(
         if file is not None:  # takes its place only once the motion has been written too
             file.write(trace_text(journey).encode())
         if output is not None:
-            write_motion(output, journey.motion)
+            write_motion(output, journey.motion, planted=journey.planted, compact=compact)
     if sender is not None:
         with sender, screen.progress(quiet, {"play": "playing"}) as progress:
             _play(sender, journey.motion, progress)

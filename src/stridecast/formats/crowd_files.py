@@ -20,6 +20,7 @@ from jaxtyping import Float, Int
 from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
 from stridecast.formats.files import check_place
+from stridecast.formats.glb import GlbCrowd, Planted, check_compact
 from stridecast.formats.trajectories import load_trajectories
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
 from stridecast.formats.usd import ENDINGS as USD
@@ -30,8 +31,11 @@ from stridecast.model.scene import Scene
 
 Array = np.ndarray
 
-OUTPUTS = (".csv", ".parquet", ".bvh", *USD)
-"""Endings of what a crowd is written as."""
+SCENES = (".glb", *USD)
+"""Endings of files that hold everybody, ..."""
+
+OUTPUTS = (".csv", ".parquet", ".bvh", *SCENES)
+"""... and of all that a crowd is written as."""
 
 FLUSH = 1.0
 """Rows reach the disk at least so often, seconds, ..."""
@@ -111,8 +115,8 @@ class CrowdFiles:
         Everybody's places: ``id,time,x,y,heading,speed``.
     ``x.bvh``
         ``x.csv``, and for each person ``x.NAME.bvh``; ``x.people.csv`` tells whose is which, and when each begins.
-    ``x.usd``, ``x.usda``, ``x.usdc``
-        ``x.csv``, and everybody in one scene, which is written at the end; what an error leaves is ``x.part.usd``.
+    ``x.glb``, ``x.usd``, ``x.usda``, ``x.usdc``
+        ``x.csv``, and everybody in one scene, which is written at the end; what an error leaves is ``x.part.glb``.
     ``x.movers.csv``
         Beside each of these, where the obstacles were that move; they wait for people (see ``moved_as_written``).
 
@@ -125,6 +129,8 @@ class CrowdFiles:
         A name as above.
     movers
         So many obstacles move.
+    compact
+        Write a GLB with rotations of 16 bits (see ``write_glb``).
 
     Raises
     ------
@@ -132,15 +138,17 @@ class CrowdFiles:
         Another ending, or the file system refuses.
     """
 
-    def __init__(self, output: str | Path, *, movers: int = 0) -> None:
+    def __init__(self, output: str | Path, *, movers: int = 0, compact: bool = False) -> None:
         self.output = Path(output)
         kind = kind_of(self.output)
-        self.bodies = kind == ".bvh" or kind in USD
+        check_compact(self.output, compact)
+        self.bodies = kind == ".bvh" or kind in SCENES
         self.table = self.output.with_suffix(".csv") if self.bodies else self.output
         self.movers = movers_of(self.output) if movers else None
         self.index = self.output.with_suffix(".people.csv") if kind == ".bvh" else None
-        self._scene: UsdScene | None = None
-        self._in_scene = kind in USD
+        self._scene: UsdScene | GlbCrowd | None = None
+        self._in_scene = kind in SCENES
+        self._compact = compact
         self.motions: list[Path] = []
         self.kept: list[Path] = []
         self._names: set[str] = set()
@@ -169,7 +177,7 @@ class CrowdFiles:
         for part in self._parts:
             part.close()
         if self._in_scene:
-            (self._scene or UsdScene(30.0)).save(self.output)
+            self._scene_of(30.0).save(self.output)
         for part in self._parts:
             if part.path.suffix.lower() == ".parquet":
                 csv_to_parquet(part.part, part.path)
@@ -188,6 +196,13 @@ class CrowdFiles:
         with suppress(FileError):
             self._scene.save(part)
             self.kept.append(part)
+
+    def _scene_of(self, frame_rate: float) -> UsdScene | GlbCrowd:
+        """The scene, which is begun when there is somebody to be in it."""
+        if self._scene is None:
+            glb = self.output.suffix.lower() == ".glb"
+            self._scene = GlbCrowd(self.output, compact=self._compact) if glb else UsdScene(frame_rate)
+        return self._scene
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -214,11 +229,35 @@ class CrowdFiles:
         rows = [f"{k + 1},{time:.9f},{x:.8f},{0.0 - z:.8f}\n" for k, (x, z) in enumerate(places.tolist())]
         self._parts[-1].add("".join(rows))
 
-    def add_motion(self, number: int, name: str, start: float, motion: Motion, height: float) -> Path:
-        """Write somebody's motion and its row of the index; ``start`` in seconds, ``height`` in metres."""
+    def add_motion(
+        self,
+        number: int,
+        name: str,
+        start: float,
+        motion: Motion,
+        height: float,
+        *,
+        planted: Planted | None = None,
+    ) -> Path:
+        """Write somebody's motion and its row of the index.
+
+        Parameters
+        ----------
+        number, name
+            Who it is.
+        start
+            Time of the first frame, seconds.
+        motion, height
+            The motion, and how tall they are, metres.
+        planted
+            Which feet stand at which frame; a GLB tells it.
+        """
         if self._in_scene:
-            self._scene = self._scene or UsdScene(motion.frame_rate)
-            self._scene.add(motion, name=name, start=start)
+            scene = self._scene_of(motion.frame_rate)
+            if isinstance(scene, GlbCrowd):
+                scene.add(motion, name=name, start=start, planted=planted)
+            else:
+                scene.add(motion, name=name, start=start)
             return self.output
         path = self._place_of(number, name)
         write_bvh(path, motion)
