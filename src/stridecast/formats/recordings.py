@@ -17,10 +17,17 @@ from stridecast.formats.asf import read_asf
 from stridecast.formats.bvh import read_bvh
 from stridecast.formats.c3d import read_c3d
 from stridecast.formats.files import looks_like, read_start
+from stridecast.formats.glb_motion import read_glb
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
 
-RECORDINGS = {".bvh": "BVH", ".amc": "AMC with its ASF", ".npz": "AMASS and other SMPL motion", ".c3d": "C3D"}
+RECORDINGS = {
+    ".bvh": "BVH",
+    ".amc": "AMC with its ASF",
+    ".npz": "AMASS and other SMPL motion",
+    ".c3d": "C3D",
+    ".glb": "GLB",
+}
 """Suffixes of the recordings that ``load_motion`` reads, and what they are."""
 
 SKELETONS = {".bvh": "BVH", ".asf": "ASF"}
@@ -43,7 +50,7 @@ def load_motion(
     Parameters
     ----------
     path
-        A BVH, AMC, AMASS (``.npz``) or C3D file, known by its suffix, else by its first words.
+        A BVH, AMC, GLB, AMASS (``.npz``) or C3D file, known by its suffix, else by its first words.
     roles
         Joints of the body whose names are unusual, role to joint name; the others are found by their names.
     scale
@@ -154,6 +161,8 @@ def _read(
     if suffix == ".npz":
         return read_amass(path, body_model=body_model)
     seems = looks_like(read_start(path)) if suffix not in RECORDINGS else ""
+    if suffix == ".glb" or "GLB" in seems:
+        return read_glb(path)
     if suffix == ".bvh" or "BVH" in seems:
         return read_bvh(path)
     if suffix == ".amc" or "AMC" in seems:
