@@ -19,9 +19,9 @@ from bodies import humanoid, standing, writhing
 from glbs import Glb, packed
 from stridecast.body import kinematics
 from stridecast.errors import FileError, StridecastError
-from stridecast.formats.glb import GlbCrowd, write_glb
+from stridecast.formats.glb import GlbCrowd, body_glb, write_glb
 from stridecast.formats.glb_motion import read_glb
-from stridecast.formats.recordings import load_motion
+from stridecast.formats.recordings import load_motion, load_skeleton
 from synthetic_gait import gait, ramps
 
 
@@ -312,3 +312,18 @@ def test_names_and_several_takes(tmp_path):
     back = read_glb(tmp_path / "a.glb")
     assert back.names == skeleton.names
     assert back.notes == ("of 2 animations the first is read",)
+
+
+def test_a_skeleton_needs_no_animation(tmp_path, walk):
+    (tmp_path / "body.glb").write_bytes(body_glb(walk.skeleton))
+    write_glb(tmp_path / "walk.glb", walk)
+    for name in ("body", "walk"):
+        skeleton = load_skeleton(tmp_path / f"{name}.glb")
+        assert skeleton.names == walk.skeleton.names
+        assert dict(skeleton.roles) == dict(walk.skeleton.roles)
+        np.testing.assert_allclose(skeleton.offsets, walk.skeleton.offsets, atol=1e-6)
+    with pytest.raises(FileError, match="has no animation"):
+        load_motion(tmp_path / "body.glb")
+    (tmp_path / "none.glb").write_bytes(packed({}))
+    with pytest.raises(FileError, match="has no animation"):
+        load_skeleton(tmp_path / "none.glb")

@@ -54,6 +54,21 @@ def read_glb(path: str | Path) -> RawRecording:
         raise FileError(f"cannot be read: {error.strerror or error}", path=path) from error
 
 
+def read_glb_at_rest(path: str | Path) -> RawRecording:
+    """Read the skeleton of a GLB, one frame at rest: of its first skin, else of what its first animation turns.
+
+    Raises
+    ------
+    FileError
+        As of ``read_glb``, or there is neither a skin nor an animation.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            return _Figure(GltfReader(path, file), still=True).recording()
+    except OSError as error:
+        raise FileError(f"cannot be read: {error.strerror or error}", path=path) from error
+
+
 class _Track(NamedTuple):
     times: Float[Array, "keys"]
     values: Float[Array, "keys components"]
@@ -63,14 +78,21 @@ class _Track(NamedTuple):
 class _Figure:
     """What of a file is read: which nodes are joints, how they rest, and the animation that moves them."""
 
-    def __init__(self, reader: GltfReader) -> None:
+    def __init__(self, reader: GltfReader, *, still: bool = False) -> None:
         self.reader = reader
         self.nodes = reader.objects("nodes")
         self.notes: list[str] = []
-        self.tracks, self.told = self._tracks()
+        self.tracks: dict[tuple[int, str], _Track] = {}
+        self.told: Mapping[str, Any] = {}
+        if not (still and reader.objects("skins")):
+            self.tracks, self.told = self._tracks()
+            if not any(path == "rotation" for _, path in self.tracks):
+                reader.wrong("has no animation that turns the joints of a skeleton")
         self.joints, self.binds = self._joints()
         self.root = self.joints[0]
-        self.times, self.rate = self._clock()
+        self.times, self.rate = np.zeros(1), 30.0
+        if not still:
+            self.times, self.rate = self._clock()
 
     def recording(self) -> RawRecording:
         """The figure in the form of all recordings."""
@@ -177,7 +199,7 @@ class _Figure:
                 r.wrong(f"skin {k} must have a list of joints")
             for joint in found:
                 r.one("nodes", joint, f"skin {k}")
-            if not moving.isdisjoint(found):
+            if not (moving and moving.isdisjoint(found)):
                 listed = list(dict.fromkeys(found))
                 binds = self._bound(skin, k)
                 if len(skins) > 1:
@@ -185,8 +207,6 @@ class _Figure:
                 break
         if not listed:
             listed = sorted(node for node, path in self.tracks if path == "rotation")
-        if not listed:
-            r.wrong("has no animation that turns the joints of a skeleton")
         tree = self._tree(listed)
         if len(tree) > MOST_JOINTS:
             r.wrong(f"has a skeleton of {len(tree)} joints; at most {MOST_JOINTS} are read")
