@@ -155,3 +155,11 @@ def complaints(node: str, *paths: Path) -> list[str]:
         for issue in report["issues"]["messages"]
         if issue["severity"] < 2
     ]
+
+
+def played(node: str, path: Path, times: list[float]) -> list[list[dict[str, Any]]]:
+    """What three.js makes of a file: at each time, of each skinned figure, its ``joints`` and its first ``corner``."""
+    command = [node, str(TESTS / "node" / "play.mjs"), str(path), *map(str, times)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)

@@ -309,7 +309,7 @@ def test_a_walk_that_cannot_be_is_refused(database, points, tmp_path):
     ]:
         bad.write_text(content)
         assert says in refused("walk", database, "--input", bad, "-o", out)
-    assert "motion is written as *.bvh" in refused("walk", database, "--curve", "line", "-o", tmp_path / "out.glb")
+    assert "motion is written as *.bvh" in refused("walk", database, "--curve", "line", "-o", tmp_path / "out.fbx")
     assert "no such folder" in refused("walk", database, "--curve", "line", "-o", tmp_path / "none" / "out.bvh")
     assert "no such file" in refused("walk", tmp_path / "none", "--curve", "line", "-o", out)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.csv", "points.csv", "walk.safetensors"]

@@ -156,7 +156,7 @@ def test_a_crowd_that_cannot_be_is_refused(scene, database, tmp_path):
         assert says in refused("crowd", bad, "--database", database, "-o", out), content
     for arguments, says in [
         ([tmp_path / "none.yaml", "-o", out], "none.yaml"),
-        ([scene, "-o", tmp_path / "out.glb"], "a crowd is written as *.csv, *.parquet, *.bvh"),
+        ([scene, "-o", tmp_path / "out.fbx"], "a crowd is written as *.csv, *.parquet, *.bvh"),
         ([scene, "-o", tmp_path / "none" / "out.csv"], "no such folder"),
         ([scene, "-o", out, "--seconds", 0], "seconds must lie above 0"),
         ([scene, "-o", out, "--rate", 1], "between 10 and 240 Hz"),

@@ -111,7 +111,7 @@ def test_what_nobody_showed_is_told(database):
         (["--subject", "99"], "no subject '99' in the database; there are 01, 02"),
         (["--cycles", 2, "--seconds", 3], "cycles or seconds, not both"),
         (["--cycles", 0], "cycles must lie between 1 and"),
-        (["-o", "clip.glb"], "clip.glb: motion is written as *.bvh"),
+        (["-o", "clip.fbx"], "clip.fbx: motion is written as *.bvh"),
         (["-o", "none/clip.bvh"], "no such folder"),
     ],
 )

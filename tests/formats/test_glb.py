@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from blenders import run_in_blender
 from bodies import humanoid, standing, writhing
-from glbs import Glb, complaints
+from glbs import Glb, complaints, played
 from stridecast.body import kinematics
 from stridecast.body.mannequin import mannequin
 from stridecast.body.skinning import skin
@@ -108,12 +108,27 @@ def test_a_crowd_shares_its_bodies_and_a_clock(tmp_path, compact):
         for frame in (0, 13, 29):
             there = glb.world(0, start + frame / 30)[told["joints"], :3, 3]
             assert np.abs(there - ours[frame]).max() < (COMPACT if compact else AGREE)
-        for when, shown in ((start - 0.01, False), (start, True), (start + 29 / 30, True), (start + 1.01, False)):
+        for when, shown in ((start - 0.02, False), (start, True), (start + 29 / 30, True), (start + 1.01, False)):
             if 0 <= when <= 1.2 + 29 / 30:
                 spread = np.ptp(glb.skinned(0, 0, glb.world(0, when)), axis=0) if told is glb["skins"][0] else None
                 places = glb.world(0, when)[told["joints"], :3, 3]
                 assert (np.ptp(places, axis=0).max() > 0.1) == shown
                 assert spread is None or (spread.max() > 0.1) == shown
+
+
+@pytest.mark.parametrize("begins", [-3.0, 1.7e9])
+def test_any_clock_will_do(tmp_path, khronos, begins):
+    scene = GlbCrowd(tmp_path / "a.glb")
+    for late in (1.0, 0.0):
+        scene.add(writhing(frames=30), start=begins + late)
+    scene.save()
+    glb = Glb((tmp_path / "a.glb").read_bytes())
+    assert glb["animations"][0]["extras"]["stridecast"]["origin"] == begins
+    ours = kinematics.pose(writhing(frames=30)).positions
+    for told, late in zip(glb["skins"], (1.0, 0.0), strict=True):
+        there = glb.world(0, late + 7 / 30)[told["joints"], :3, 3]
+        assert np.abs(there - ours[7]).max() < AGREE
+    assert complaints(khronos, tmp_path / "a.glb") == []
 
 
 def test_other_proportions_are_other_meshes(tmp_path):
@@ -147,6 +162,27 @@ def test_khronos_would_complain(tmp_path, khronos):
     data = body_glb(humanoid()).replace(b'"VEC4"', b'"VEC3"')
     (tmp_path / "bad.glb").write_bytes(data)
     assert complaints(khronos, tmp_path / "bad.glb")
+
+
+@pytest.mark.parametrize("compact", [False, True])
+@pytest.mark.parametrize("many", [False, True])
+def test_three_has_joints_and_skin_where_ours_are(tmp_path, khronos, many, compact):
+    path = tmp_path / "a.glb"
+    all_ = crowd(path, compact=compact) if many else [(writhing(frames=30), 0.0)]
+    if not many:
+        write_glb(path, all_[0][0], compact=compact)
+    said = played(khronos, path, [k / 30 for k in range(0, 66, 3)])
+    agree = COMPACT if compact else AGREE
+    for n, (motion, start) in enumerate(all_):
+        pose, mesh = kinematics.pose(motion), mannequin(motion.skeleton)
+        for k, figures in enumerate(said):
+            frame = 3 * k - round(30 * start)
+            if 0 <= frame < motion.frames:
+                assert np.abs(np.array(figures[n]["joints"]) - pose.positions[frame]).max() < agree
+                world = kinematics.World(*(a[frame] for a in pose))
+                assert np.abs(figures[n]["corner"] - skin(mesh, world)[0]).max() < agree + 1e-4
+            elif many:
+                assert np.ptp(figures[n]["joints"], axis=0).max() < 1e-6  # not there
 
 
 def test_small_and_fast(tmp_path):
@@ -185,8 +221,12 @@ def test_refusals_change_nothing(tmp_path, monkeypatch):
         write_glb(tmp_path / "none" / "a.glb", standing())
     with pytest.raises(FileError, match="No such file"):
         GlbCrowd(tmp_path / "none" / "a.glb")
-    monkeypatch.setattr("stridecast.formats.gltf.LARGEST", (1 << 28) + 1000)
     scene = GlbCrowd(path)
+    with pytest.raises(InputError, match="start must be a number"):
+        scene.add(standing(), start=np.nan)
+    with pytest.raises(InputError, match="a row for each of 60 frames, not 3"):
+        scene.add(standing(), planted=np.ones((3, 2), bool))
+    monkeypatch.setattr("stridecast.formats.gltf.LARGEST", (1 << 28) + 1000)
     with pytest.raises(FileError, match="4 GB"):
         scene.add(standing())
     scene.close()

@@ -36,6 +36,9 @@ TRUNK, NECK = 0.515, 0.145
 """From the hip joints to the shoulder joints and on to the head's joint where the skeleton does not tell, metres."""
 
 
+SHORTEST = 0.02
+"""Bones of arms and legs that are shorter have no flesh, metres."""
+
 CROWN = 0.31
 """From the shoulder joints to the crown at least, metres."""
 
@@ -114,7 +117,9 @@ def mannequin(skeleton: Skeleton, *, low: bool = False) -> SkinnedMesh:
 def _scale(skeleton: Skeleton, places: Float[Array, "joints 3"]) -> float:
     """How large the tables' widths are on this body."""
     if all(f"{side}_{part}" in skeleton.roles for side in ("left", "right") for part in ("thigh", "shin", "foot")):
-        return skeleton.leg_length / shape.LEG
+        leg = skeleton.leg_length
+        if leg > 1e-6:
+            return leg / shape.LEG
     tall = float(np.ptp(places[:, 1]))
     return tall / (STATURE - 0.2) if tall > 1e-6 else 1.0
 
@@ -173,7 +178,7 @@ def _head(body: _Body, neck: Float[Array, "3"], crown: Float[Array, "3"], joint:
 
 def _leg(body: _Body, side: str) -> list[_Part]:
     path = [body.at(f"{side}_{part}") for part in ("thigh", "shin", "foot")]
-    if any(place is None for place in path):
+    if any(place is None for place in path) or _folded(body, path):
         return []
     table = shape.rows_at(shape.LEG_TUBE, body.detail.leg)
     joints = _joints(body, (f"{side}_thigh", f"{side}_shin", f"{side}_foot"))
@@ -188,6 +193,8 @@ def _arm(body: _Body, side: str) -> list[_Part]:
     shoulder, elbow = path[0], path[1]
     along = _unit(elbow - shoulder, -UP)
     wrist = path[2] if path[2] is not None else elbow + 0.25 * body.scale * along
+    if _folded(body, [shoulder, elbow, wrist]):
+        return []
     along = _unit(wrist - elbow, along)
     hand = body.carrier(f"{side}_hand", f"{side}_forearm")
     end = body.end(hand) if f"{side}_hand" in body.skeleton.roles else None
@@ -246,6 +253,12 @@ def _foot(body: _Body, side: str) -> list[_Part]:
     chain = [foot] if joint is None else [foot, joint]
     weights = _graded(body, np.interp(tube.places, t, way), chain, np.array([0.0, length])[: len(chain)], 0.022 * scale)
     return [_Part(tube, weights)]
+
+
+def _folded(body: _Body, path: list[Float[Array, "3"] | None]) -> bool:
+    """Whether a limb has a bone without length, round which there is no flesh."""
+    bones = np.diff(np.array(path, np.float64), axis=0)
+    return bool((np.linalg.norm(bones, axis=-1) < SHORTEST * body.scale).any())
 
 
 def _limb(
@@ -319,8 +332,8 @@ def _shrug(body: _Body, side: str, torso: Tube, weights: Float[Array, "vertices 
         return
     reach = body.places[joint] - middle
     out = np.clip((torso.positions - middle) @ reach / max(reach @ reach, 1e-9), 0.0, 1.0)
-    x = np.clip((out - 0.35) / 0.5, 0.0, 1.0)
-    share = 0.75 * x * x * (3 - 2 * x) * np.interp(torso.places, [0.7, 0.9, 1.05, 1.2], [0.0, 1.0, 1.0, 0.0])
+    x = np.clip((out - 0.1) / 0.75, 0.0, 1.0)
+    share = 0.9 * x * x * (3 - 2 * x) * np.interp(torso.places, [0.6, 0.95, 1.3, 1.7], [0.0, 1.0, 1.0, 0.0])
     weights *= 1.0 - share[:, None]
     weights[:, clavicle] += share
 

@@ -29,10 +29,11 @@ def skin(mesh: SkinnedMesh, world: World) -> Float[np.ndarray, "*shape vertices 
 def vertex_normals(
     positions: Float[np.ndarray, "vertices 3"], triangles: np.ndarray
 ) -> Float[np.ndarray, "vertices 3"]:
-    """Unit normals of a closed surface: the mean of its triangles about each vertex, by area."""
+    """Unit normals of a closed surface: the mean of its triangles about each vertex, by area; up where it has none."""
     a, b, c = (positions[triangles[:, k]] for k in range(3))
     faces = np.cross(b - a, c - a)
     out = np.zeros_like(positions)
     for k in range(3):
         np.add.at(out, triangles[:, k], faces)
-    return out / np.maximum(np.linalg.norm(out, axis=-1, keepdims=True), 1e-12)
+    sizes = np.linalg.norm(out, axis=-1, keepdims=True)
+    return np.where(sizes > 1e-18, out / np.maximum(sizes, 1e-18), [0.0, 1.0, 0.0])

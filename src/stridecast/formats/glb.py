@@ -30,6 +30,10 @@ ALIKE = 1e-6
 """Bodies whose bones are alike to this share of their length are one body in different sizes."""
 
 
+LONG = 4096.0
+"""Single precision tells frames apart so far from 0, seconds; what is later, or before 0, gets an origin of its own."""
+
+
 def check_compact(path: str | Path, compact: bool) -> None:
     """Refuse ``compact`` for what is no GLB.
 
@@ -126,8 +130,11 @@ class GlbCrowd:
     """A crowd as one file: a mesh that people of alike proportions share, and one animation on one clock.
 
     The animation moves everybody, as that is what Blender, three.js and Unreal play at once; somebody who is not there
-    yet, or has left, has the scale 0. Numbers go to a nameless file beside the place as people are added, so memory
-    holds a few kilobytes for each.
+    yet, or has left, has the scale 0. Time is that of ``start``, as in the files beside, unless some of it is before 0
+    or so late that single precision does not tell its frames apart: then 0 is when the first person appears, and
+    ``origin`` of the animation's extras says when that is.
+
+    Numbers go to a nameless file beside the place as people are added, so memory holds a few kilobytes for each.
 
     Parameters
     ----------
@@ -151,7 +158,7 @@ class GlbCrowd:
         self._figures: list[tuple[Skeleton, Figure]] = []
         self._roots: list[int] = []
         self._hidden: list[tuple[int, float, float, float]] = []
-        self._last = 0.0
+        self._first, self._last = np.inf, -np.inf
         self._rate = 0.0
 
     def add(self, motion: Motion, *, name: str = "", start: float = 0.0, planted: Planted | None = None) -> None:
@@ -159,11 +166,17 @@ class GlbCrowd:
 
         Raises
         ------
+        InputError
+            ``start`` is no number, or ``planted`` has another length than the motion.
         SkeletonError
             The skeleton has no roles to make a skin.
         FileError
             The disk is full, or the file would be larger than 4 GB.
         """
+        if not np.isfinite(start):
+            raise InputError(f"the start must be a number of seconds, not {start}")
+        if planted is not None and len(planted) != motion.frames:
+            raise InputError(f"planted must have a row for each of {motion.frames} frames, not {len(planted)}")
         figure, scale = self._figure_of(motion.skeleton)
         extras: dict[str, Any] = {"start": start, **_provenance(motion)}
         if planted is not None:
@@ -171,8 +184,9 @@ class GlbCrowd:
         nodes = figure.place(name or motion.name or f"Person {self.people + 1}", motion, scale=scale, extras=extras)
         self._keys.move(nodes.joints, motion, start=start, scale=scale, compact=self.compact)
         end = start + motion.seconds
-        self._hidden.append((nodes.person, scale, start, end + 1.0 / motion.frame_rate))
-        self._last = max(self._last, end)
+        half = 0.5 / motion.frame_rate  # between frames, so that rounding hides nobody in their first or last one
+        self._hidden.append((nodes.person, scale, start - half, end + half))
+        self._first, self._last = min(self._first, start), max(self._last, end)
         self._rate = max(self._rate, motion.frame_rate)
         self._roots += nodes.roots
         self.people += 1
@@ -185,10 +199,13 @@ class GlbCrowd:
         FileError
             The file system refuses; what was there is untouched.
         """
-        for node, scale, start, end in self._hidden:
-            self._keys.show(node, scale, start, end, self._last)
         if self.people:
-            self._keys.save("Crowd", {"seconds": self._last, "frame_rate": self._rate})
+            far = self._first < 0 or self._last > LONG
+            origin = self._first if far else 0.0
+            for node, scale, start, end in self._hidden:
+                self._keys.show(node, scale, start - origin, end - origin, self._last - origin)
+            told = {"origin": origin, "seconds": self._last - origin, "frame_rate": self._rate}
+            self._keys.save("Crowd", told, origin=origin)
         self._writer.save(self.path if path is None else path, _head(self._roots))
         self.close()
 

@@ -146,8 +146,8 @@ class Keys:
             at += 1
 
     def show(self, node: int, scale: float, start: float, end: float, last: float) -> None:
-        """Hide a person by the scale 0 before they appear and from when they have left."""
-        times, scales = [start], [scale]
+        """Hide a person by the scale 0 before they appear and from when they have left; ``last`` is when all ends."""
+        times, scales = [0.0], [scale]
         if start > 0:
             times, scales = [0.0, start], [0.0, scale]
         if end <= last:
@@ -159,8 +159,10 @@ class Keys:
         when = self._writer.accessor(np.array(times, "<f4"), bounds=True)
         self._channel(node, "scale", when, self._writer.accessor(keys), "STEP")
 
-    def save(self, name: str, extras: dict[str, Any]) -> None:
-        """Add the animation to the file."""
+    def save(self, name: str, extras: dict[str, Any], *, origin: float = 0.0) -> None:
+        """Add the animation to the file; its time 0 is that of ``origin``."""
+        for (start, frames, rate), accessor in self._times.items():
+            self._writer.come(accessor, (start - origin + np.arange(frames) / rate).astype("<f4"))
         self._writer.add_text(
             "animations",
             f'{{"name":{to_json(name)},"channels":[{",".join(self._channels)}],"samplers":[{",".join(self._samplers)}],'
@@ -174,10 +176,10 @@ class Keys:
         self._channels.append(f'{{"sampler":{sampler},"target":{{"node":{node},"path":"{path}"}}}}')
 
     def _times_of(self, start: float, frames: int, rate: float) -> int:
-        """Accessor of the times of frames."""
+        """Accessor of the times of frames, which are written at the end: only then it is clear where they begin."""
         key = (start, frames, rate)
         if key not in self._times:
-            self._times[key] = self._writer.accessor((start + np.arange(frames) / rate).astype("<f4"), bounds=True)
+            self._times[key] = self._writer.later()
         return self._times[key]
 
 

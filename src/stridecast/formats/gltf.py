@@ -106,21 +106,17 @@ class GltfWriter:
         """Add numbers with what they are; the last axis are the components where there are more than one."""
         return self.part_of(self.view(array, target), 0, array, bounds=bounds, normalized=normalized)
 
+    def later(self) -> int:
+        """An accessor whose numbers come later, by ``come``."""
+        return self.add_text("accessors", "")
+
+    def come(self, index: int, array: Array) -> None:
+        """Add the numbers of an accessor that has been asked for, with their bounds."""
+        self._parts["accessors"][index] = _described(self.view(array), 0, array, bounds=True, normalized=False)
+
     def part_of(self, view: int, start: int, array: Array, *, bounds: bool = False, normalized: bool = False) -> int:
         """Say what the numbers of a view are from a byte on; ``array`` tells their type, count and bounds."""
-        components = 1 if array.ndim == 1 else array.shape[-1]
-        extra = ""
-        if bounds:
-            flat = array.reshape(-1, components)
-            least, most = (to_json([number(x) for x in f(axis=0).tolist()]) for f in (flat.min, flat.max))
-            extra = f',"min":{least},"max":{most}'
-        if normalized:
-            extra += ',"normalized":true'
-        return self.add_text(
-            "accessors",
-            f'{{"bufferView":{view},"byteOffset":{start},"componentType":{COMPONENTS[array.dtype]},'
-            f'"count":{array.size // components},"type":"{TYPES[components]}"{extra}}}',
-        )
+        return self.add_text("accessors", _described(view, start, array, bounds=bounds, normalized=normalized))
 
     def save(self, path: str | Path, head: Mapping[str, object]) -> None:
         """Write the file beside its place and rename it; ``head`` is what is no list (``asset``, ``scene``).
@@ -173,6 +169,21 @@ class GltfWriter:
             self._file.write(block.data)
         except OSError as error:
             raise FileError(f"cannot be written: {error.strerror or error}", path=self._beside) from error
+
+
+def _described(view: int, start: int, array: Array, *, bounds: bool, normalized: bool) -> str:
+    components = 1 if array.ndim == 1 else array.shape[-1]
+    extra = ""
+    if bounds:
+        flat = array.reshape(-1, components)
+        least, most = (to_json([number(x) for x in f(axis=0).tolist()]) for f in (flat.min, flat.max))
+        extra = f',"min":{least},"max":{most}'
+    if normalized:
+        extra += ',"normalized":true'
+    return (
+        f'{{"bufferView":{view},"byteOffset":{start},"componentType":{COMPONENTS[array.dtype]},'
+        f'"count":{array.size // components},"type":"{TYPES[components]}"{extra}}}'
+    )
 
 
 def number(value: float) -> float | int:

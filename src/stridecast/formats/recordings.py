@@ -17,13 +17,20 @@ from stridecast.formats.asf import read_asf
 from stridecast.formats.bvh import read_bvh
 from stridecast.formats.c3d import read_c3d
 from stridecast.formats.files import looks_like, read_start
+from stridecast.formats.glb_motion import read_glb, read_glb_at_rest
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
 
-RECORDINGS = {".bvh": "BVH", ".amc": "AMC with its ASF", ".npz": "AMASS and other SMPL motion", ".c3d": "C3D"}
+RECORDINGS = {
+    ".bvh": "BVH",
+    ".amc": "AMC with its ASF",
+    ".npz": "AMASS and other SMPL motion",
+    ".c3d": "C3D",
+    ".glb": "GLB",
+}
 """Suffixes of the recordings that ``load_motion`` reads, and what they are."""
 
-SKELETONS = {".bvh": "BVH", ".asf": "ASF"}
+SKELETONS = {".bvh": "BVH", ".asf": "ASF", ".glb": "GLB"}
 """Suffixes of the files that ``load_skeleton`` reads, and what they are."""
 
 
@@ -43,7 +50,7 @@ def load_motion(
     Parameters
     ----------
     path
-        A BVH, AMC, AMASS (``.npz``) or C3D file, known by its suffix, else by its first words.
+        A BVH, AMC, GLB, AMASS (``.npz``) or C3D file, known by its suffix, else by its first words.
     roles
         Joints of the body whose names are unusual, role to joint name; the others are found by their names.
     scale
@@ -129,12 +136,15 @@ def load_recording(
 
 
 def load_skeleton(path: str | Path, *, roles: Mapping[str, str] | None = None, scale: float | None = None) -> Skeleton:
-    """Load only the skeleton of a BVH or ASF file; parameters and errors as of ``load_motion``."""
+    """Load only the skeleton of a BVH, ASF or GLB file; parameters and errors as of ``load_motion``."""
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in SKELETONS:
         raise FileError(f"is no skeleton that can be read; readable are {_listed(SKELETONS)}", path=path)
-    recording = read_bvh(path) if suffix == ".bvh" else read_asf(path).at_rest()
+    if suffix == ".glb":
+        recording = read_glb_at_rest(path)
+    else:
+        recording = read_bvh(path) if suffix == ".bvh" else read_asf(path).at_rest()
     try:
         return to_skeleton(recording, roles=roles, scale=scale)[0]
     except SkeletonError as error:
@@ -154,6 +164,8 @@ def _read(
     if suffix == ".npz":
         return read_amass(path, body_model=body_model)
     seems = looks_like(read_start(path)) if suffix not in RECORDINGS else ""
+    if suffix == ".glb" or "GLB" in seems:
+        return read_glb(path)
     if suffix == ".bvh" or "BVH" in seems:
         return read_bvh(path)
     if suffix == ".amc" or "AMC" in seems:
