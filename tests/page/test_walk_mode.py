@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from browsers import Frame, Visitor
+from stridecast.formats.recordings import load_motion
 
 ROUNDING = 1e-4
 """Frames carry single precision."""
@@ -131,3 +133,22 @@ def test_a_gamepad_pushes_and_its_buttons_choose(visitor: Visitor) -> None:
     visitor.until(lambda: speed(visitor.frames[-1]) < 0.05, "a walker who stands when the stick is let go")
     visitor.page.evaluate("() => { window.pad.buttons[1].pressed = true; }")
     visitor.until(lambda: visitor.last("settings_state", motion="run"), "running")
+
+
+def test_what_was_walked_is_downloaded(visitor: Visitor, tmp_path: Path) -> None:
+    visitor.go()
+    visitor.page.keyboard.down("w")
+    visitor.until(lambda: speed(visitor.frames[-1]) > 0.9, "a walker at speed")
+    visitor.page.keyboard.up("w")
+    for kind in ("bvh", "glb", "csv"):
+        with visitor.page.expect_download() as download:
+            visitor.button(kind.upper())
+        assert download.value.suggested_filename == f"walk.{kind}"
+        download.value.save_as(tmp_path / f"walk.{kind}")
+    motions = [load_motion(tmp_path / f"walk.{kind}") for kind in ("bvh", "glb")]
+    shared = min(motion.frames for motion in motions)
+    assert shared > 20
+    np.testing.assert_allclose(*(motion.root_positions[:shared] for motion in motions), atol=1e-3)
+    header, *rows = (tmp_path / "walk.csv").read_text().splitlines()
+    assert header.startswith("frame,time,motion,segment,input_x")
+    assert len(rows) >= shared
