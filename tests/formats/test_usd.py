@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from stridecast.errors import FileError, InputError
 from stridecast.formats.motion_files import write_motion
 from stridecast.formats.usd import UsdScene, write_usd
 from stridecast.geometry import quaternions as quat
+from stridecast.model.mesh import SkinnedMesh
 from stridecast.model.motion import Motion
 
 pxr = pytest.importorskip("pxr", reason="no usd-core (pip install 'stridecast[usd]')")
@@ -139,35 +140,22 @@ def test_other_bodies_are_other_prototypes(tmp_path):
         assert np.abs(places(3) - kinematics.pose(motion).positions[3]).max() < AGREE
 
 
-@dataclass(frozen=True)
-class Prism:
-    """A skin of two triangles a joint."""
-
-    positions: np.ndarray
-    normals: np.ndarray
-    triangles: np.ndarray
-    joints: np.ndarray
-    weights: np.ndarray
-    bind_positions: np.ndarray
-    bind_rotations: np.ndarray
-
-    @classmethod
-    def around(cls, motion: Motion) -> Prism:
-        """Bound in the pose of the first frame, which is not the rest pose."""
-        world = kinematics.forward(motion.skeleton, np.zeros(3), motion.rotations[0])
-        count = motion.skeleton.joints
-        corner = 0.05 * np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
-        weights = np.zeros((3 * count, 4))
-        weights[:, 0] = 1.0
-        return cls(
-            positions=(world.positions[:, None] + corner).reshape(-1, 3),
-            normals=np.tile([0.0, 0.0, 1.0], (3 * count, 1)),
-            triangles=np.arange(3 * count).reshape(-1, 3),
-            joints=np.repeat(np.arange(count), 3)[:, None] * np.array([1, 0, 0, 0]),
-            weights=weights,
-            bind_positions=world.positions,
-            bind_rotations=world.rotations,
-        )
+def prisms(motion: Motion) -> SkinnedMesh:
+    """A skin of a triangle a joint, bound in the pose of the first frame, which is not the rest pose."""
+    world = kinematics.forward(motion.skeleton, np.zeros(3), motion.rotations[0])
+    count = motion.skeleton.joints
+    corner = 0.05 * np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
+    weights = np.zeros((3 * count, 4))
+    weights[:, 0] = 1.0
+    return SkinnedMesh(
+        positions=(world.positions[:, None] + corner).reshape(-1, 3),
+        normals=np.tile([0.0, 0.0, 1.0], (3 * count, 1)),
+        triangles=np.arange(3 * count).reshape(-1, 3),
+        joints=np.repeat(np.arange(count), 3)[:, None] * np.array([1, 0, 0, 0]),
+        weights=weights,
+        bind_positions=world.positions,
+        bind_rotations=world.rotations,
+    )
 
 
 @pytest.mark.parametrize("many", [False, True])
@@ -175,7 +163,7 @@ def test_skins_follow_their_joints(tmp_path, many):
     from pxr import Usd, UsdGeom, UsdSkel, Vt
 
     motion = writhing(frames=10)
-    skin, path = Prism.around(motion), tmp_path / "a.usdc"
+    skin, path = prisms(motion), tmp_path / "a.usdc"
     if many:
         scene = UsdScene(30.0)
         for _ in range(2):

@@ -17,6 +17,7 @@ from typing import BinaryIO
 import numpy as np
 from jaxtyping import Float, Int
 
+from stridecast.body.mannequin import mannequin
 from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
 from stridecast.formats.files import check_place
@@ -257,7 +258,7 @@ class CrowdFiles:
             if isinstance(scene, GlbCrowd):
                 scene.add(motion, name=name, start=start, planted=planted)
             else:
-                scene.add(motion, name=name, start=start)
+                scene.add(motion, name=name, start=start, skin=mannequin)
             return self.output
         path = self._place_of(number, name)
         write_bvh(path, motion)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from stridecast.body.mannequin import mannequin
 from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
 from stridecast.formats.files import check_place
@@ -51,7 +52,7 @@ def write_motion(path: str | Path, motion: Motion, *, planted: Planted | None = 
     check_motion_place(path, compact=compact)
     ending = Path(path).suffix.lower()
     if ending in USD:
-        write_usd(path, motion)
+        write_usd(path, motion, skin=mannequin)
     elif ending == ".glb":
         write_glb(path, motion, planted=planted, compact=compact)
     else:

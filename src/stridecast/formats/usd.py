@@ -8,9 +8,10 @@ bound to an animation of its own.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +19,7 @@ from jaxtyping import Float
 from stridecast.body import kinematics
 from stridecast.errors import FileError, InputError
 from stridecast.formats.files import replacing_path
+from stridecast.model.mesh import SkinnedMesh
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
 
@@ -34,17 +36,8 @@ _REACH = 1.5
 """Nothing of a body is further from its root than so many times the farthest joint of the rest pose."""
 
 
-@runtime_checkable
-class Skin(Protocol):
-    """Triangles around a skeleton, such as those of the mannequin: the numbers of a bind pose, metres."""
-
-    positions: Array
-    normals: Array
-    triangles: Array
-    joints: Array
-    weights: Array
-    bind_positions: Array
-    bind_rotations: Array
+Skin = SkinnedMesh | Callable[[Skeleton], SkinnedMesh]
+"""A skin, or what makes one for a skeleton, such as ``mannequin``."""
 
 
 def write_usd(path: str | Path, motion: Motion, *, skin: Skin | None = None) -> None:
@@ -243,16 +236,17 @@ class UsdScene:
         usd.CreateJointsAttr(Vt.TokenArray(_joint_paths(skeleton)))
         usd.CreateJointNamesAttr(Vt.TokenArray(list(skeleton.names)))
         rest = kinematics.rest(skeleton)
-        at = rest.positions if skin is None else skin.bind_positions
-        turned = rest.rotations if skin is None else skin.bind_rotations
+        mesh = skin(skeleton) if callable(skin) else skin
+        at = rest.positions if mesh is None else mesh.bind_positions
+        turned = rest.rotations if mesh is None else mesh.bind_rotations
         usd.CreateBindTransformsAttr(Vt.Matrix4dArray([_matrix(Gf, *pair) for pair in zip(at, turned, strict=True)]))
         still = [_matrix(Gf, offset, np.array([1.0, 0.0, 0.0, 0.0])) for offset in skeleton.offsets]
         usd.CreateRestTransformsAttr(Vt.Matrix4dArray(still))
         UsdSkel.BindingAPI.Apply(usd.GetPrim())
-        if skin is not None:
-            self._skin(f"{place}/Skin", f"{place}/Skeleton", skin)
+        if mesh is not None:
+            self._skin(f"{place}/Skin", f"{place}/Skeleton", mesh)
 
-    def _skin(self, place: str, skeleton: str, skin: Skin) -> None:
+    def _skin(self, place: str, skeleton: str, skin: SkinnedMesh) -> None:
         from pxr import Gf, UsdGeom, UsdSkel, Vt
 
         mesh = UsdGeom.Mesh.Define(self._stage, place)
