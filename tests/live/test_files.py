@@ -13,6 +13,7 @@ from urllib.parse import quote
 import numpy as np
 import pytest
 
+from glbs import Glb
 from live_clients import Client, open_socket
 from stridecast.formats.recordings import load_motion
 from stridecast.formats.store import load_database
@@ -246,6 +247,26 @@ def test_a_crowd_is_saved_as_motions_and_as_ways(narrow, guest, tmp_path):
     guest.say("export", what="csv")
     _, ways = get(narrow, guest.until("export_ready", "error").url)
     assert ways.decode().splitlines() == rows
+    guest.say("export", what="glb")
+    _, data = get(narrow, guest.until("export_ready", "error").url)
+    glb = Glb(data)
+    head = next(k for k in glb["skins"][0]["joints"] if glb["nodes"][k]["name"] == "Head")
+    first = float(rows[1].split(",")[1])
+    for time_ in (first, first + 0.5):
+        at = glb.world(0, time_)[head, :3, 3]
+        whole = motion.root_positions[round((time_ - first) * motion.frame_rate)]
+        assert np.hypot(*(at - whole)[[0, 2]]) < 0.3  # the head of the first is over their feet
+        assert 1.3 < at[1] < 1.9
+
+
+def test_the_mannequin_has_the_bones_of_the_session(narrow, guest):
+    skeleton = guest.welcome.skeleton
+    answer, data = get(narrow, f"/body.glb?session={guest.welcome.session}")
+    assert (answer.status, answer.headers["content-type"]) == (200, "model/gltf-binary")
+    glb = Glb(data)
+    assert [glb["nodes"][k]["name"] for k in glb["skins"][0]["joints"]] == skeleton.names
+    answer, said = get(narrow, "/body.glb?session=nobody")
+    assert (answer.status, json.loads(said)["error"]) == (404, "there is no such session; connect again")
 
 
 def test_downloads_end_with_the_session(narrow):

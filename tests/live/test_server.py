@@ -153,7 +153,7 @@ def test_a_place_begins_anew(client):
 def test_what_was_walked_is_saved(client, server):
     wish(client, "drive", direction=[0, 1])
     walk(client, 30)
-    for what, name in (("bvh", "walk.bvh"), ("csv", "walk.csv")):
+    for what, name in (("bvh", "walk.bvh"), ("glb", "walk.glb"), ("csv", "walk.csv")):
         client.say("export", what=what, request=7)
         ready = client.until("export_ready", "error")
         assert (ready.type, ready.name, ready.request) == ("export_ready", name, 7)

@@ -109,3 +109,25 @@ def test_sliders_and_numbers_reach_the_walker(visitor: Visitor) -> None:
     visitor.press("3")
     state = visitor.until(lambda: visitor.last("settings_state", motion="run"), "running")
     assert state["speed"] > 2.0  # another motion brings its own speed along
+
+
+def test_a_gamepad_pushes_and_its_buttons_choose(visitor: Visitor) -> None:
+    visitor.page.add_init_script(
+        """const buttons = Array.from({ length: 17 }, () => ({ pressed: false }));
+        window.pad = { connected: true, axes: [0, 0, 0, 0], buttons };
+        navigator.getGamepads = () => [null, window.pad, null, null];"""
+    )
+    visitor.go()
+    visitor.press("o")
+    visitor.settle()
+    begin = place(visitor.frames[-1])
+    visitor.page.evaluate("() => { window.pad.axes = [0.05, -1, 0, 0]; }")
+    visitor.until(lambda: speed(visitor.frames[-1]) > 0.8, "a walker at speed")
+    with visitor.recording() as frames:
+        visitor.wait(1.0)
+    assert_lawful(frames)
+    assert np.hypot(*(place(visitor.frames[-1]) - begin)) > 0.8
+    visitor.page.evaluate("() => { window.pad.axes = [0, 0, 0, 0]; }")
+    visitor.until(lambda: speed(visitor.frames[-1]) < 0.05, "a walker who stands when the stick is let go")
+    visitor.page.evaluate("() => { window.pad.buttons[1].pressed = true; }")
+    visitor.until(lambda: visitor.last("settings_state", motion="run"), "running")

@@ -165,7 +165,6 @@ function dress(page: Page, welcome: NonNullable<Page["welcome"]>): void {
   const people = new People(bodyOf(welcome.skeleton));
   page.people = people;
   page.stage.scene.add(people.group);
-  if (!welcome.glb) return;
   Skin.load(`body.glb?session=${encodeURIComponent(welcome.session)}`, people.body, MOST_SKINNED)
     .then((skin) => people.wear(skin))
     .catch((error: unknown) =>

@@ -785,7 +785,6 @@ export interface Welcome {
   bounds: string[];
   scene: ScenePart;
   limits: LimitsPart;
-  glb: boolean;
 }
 
 export type FromServer = Welcome | SettingsState | Footprint | WayState | Health | SceneChecked | SceneOpened | SceneSaved | PlayerState | PeopleMessage | ExplanationMessage | DatabaseState | ClipReady | FilesState | Progress | Built | ExportReady | Pong | ErrorMessage;

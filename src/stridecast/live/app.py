@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.requests import Request
@@ -14,6 +15,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
+from stridecast.formats.glb import body_glb
 from stridecast.live.hall import Hall
 from stridecast.live.messages import PROTOCOL
 from stridecast.live.security import Guard, Rules
@@ -73,6 +75,13 @@ def make_app(hall: Hall, rules: Rules) -> Starlette:
             return JSONResponse({"error": str(error)}, error.status, headers={"connection": "close"})
         return JSONResponse({"file": kept, "files": guest.uploads.files, "bytes": guest.uploads.size})
 
+    async def give_body(request: Request) -> Response:
+        guest = hall.guests.get(request.query_params.get("session", ""))
+        if guest is None:
+            return JSONResponse({"error": "there is no such session; connect again"}, 404)
+        body = await run_in_threadpool(body_glb, guest.skeleton)
+        return Response(body, media_type="model/gltf-binary", headers={"cache-control": "no-store"})
+
     async def give_file(request: Request) -> Response:
         found = hall.find(request.path_params["word"])
         if found is None or not found.path.is_file():
@@ -88,6 +97,7 @@ def make_app(hall: Hall, rules: Rules) -> Starlette:
         routes=[
             Route("/", page),
             WebSocketRoute("/ws", connect),
+            Route("/body.glb", give_body),
             Route("/files", take_file, methods=["POST"]),
             Route("/download/{word}", give_file),
             Mount("/assets", StaticFiles(directory=hall.bundle / "assets", check_dir=False)),

@@ -12,9 +12,10 @@ import numpy as np
 from stridecast.crowd.baking import filmed
 from stridecast.crowd.crowd import Crowd
 from stridecast.errors import InputError
-from stridecast.formats.bvh import write_bvh
 from stridecast.formats.crowd_files import CrowdFiles
 from stridecast.formats.files import replacing
+from stridecast.formats.glb import GlbCrowd
+from stridecast.formats.motion_files import write_motion
 from stridecast.formats.trace import trace_text
 from stridecast.live.frames import Figures, unpack_rotations
 from stridecast.model.motion import Motion
@@ -30,9 +31,9 @@ SHORTEST = 2
 
 
 def write_walk(path: Path, journey: Journey, what: str) -> None:
-    """A walk as ``bvh``, or as ``csv`` its trace."""
-    if what == "bvh":
-        write_bvh(path, journey.motion)
+    """A walk as ``bvh`` or ``glb``, or as ``csv`` its trace."""
+    if what != "csv":
+        write_motion(path, journey.motion, planted=journey.planted)
         return
     with replacing(path) as file:
         file.write(trace_text(journey).encode())
@@ -71,6 +72,27 @@ def write_motions(path: Path, frames: Frames, crowd: Crowd, progress: Callable[[
         with zipfile.ZipFile(path, "x", zipfile.ZIP_DEFLATED, compresslevel=3) as archive:
             for written in sorted(Path(folder).iterdir()):
                 archive.write(written, written.name)
+
+
+def write_figures(path: Path, frames: Frames, crowd: Crowd, progress: Callable[[int, int], None] | None = None) -> None:
+    """Everybody in motion as one GLB (see ``GlbCrowd``).
+
+    Raises
+    ------
+    InputError
+        Nothing has been played.
+    """
+    _check(frames)
+    scene = GlbCrowd(path)
+    try:
+        motions = _motions(frames, crowd)
+        for done, (start, motion) in enumerate(motions.values()):
+            scene.add(motion, name=motion.name, start=start)
+            if progress is not None:
+                progress(done, len(motions))
+        scene.save()
+    finally:
+        scene.close()
 
 
 def _check(frames: Frames) -> None:

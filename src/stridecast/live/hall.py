@@ -9,12 +9,13 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from stridecast.live.downloads import Download, Downloads
 from stridecast.live.messages import LimitsPart
 from stridecast.live.uploads import Uploads
 from stridecast.model.database import MotionDatabase
+from stridecast.model.skeleton import Skeleton
 
 MOST_SESSIONS = 8
 """So many clients are served at once."""
@@ -23,12 +24,14 @@ BUNDLE = Path(__file__).parent / "static"
 """Where the page lies."""
 
 
-class Guest(NamedTuple):
-    """What a session keeps in files."""
+@dataclass(eq=False)
+class Guest:
+    """What a session keeps in files, and the skeleton of those whom it shows."""
 
     folder: Path
     uploads: Uploads
     downloads: Downloads
+    skeleton: Skeleton
 
 
 @dataclass(kw_only=True, eq=False)
@@ -72,7 +75,9 @@ class Hall:
             self._folder = tempfile.TemporaryDirectory(prefix="stridecast-live-")
         folder = Path(self._folder.name, secrets.token_hex(8))
         word = secrets.token_urlsafe(24)
-        self.guests[word] = Guest(folder, Uploads(folder / "files", self.limits), Downloads(folder / "made"))
+        self.guests[word] = Guest(
+            folder, Uploads(folder / "files", self.limits), Downloads(folder / "made"), self.database.skeleton
+        )
         return word
 
     def leave(self, word: str) -> None:

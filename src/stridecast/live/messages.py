@@ -404,7 +404,6 @@ class Welcome(Part):
     bounds: list[str]
     scene: SceneDocument
     limits: LimitsPart
-    glb: bool
 
 
 class Footprint(Part):

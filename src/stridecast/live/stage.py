@@ -14,13 +14,13 @@ from typing import Any, Literal
 from stridecast import __version__
 from stridecast.crowd.rules import RULES
 from stridecast.errors import InputError
-from stridecast.formats.bvh import write_bvh
+from stridecast.formats.motion_files import write_motion
 from stridecast.formats.scenes import parse_scene, scene_of, scene_text, scene_values
 from stridecast.formats.store import load_database, save_database
 from stridecast.live import messages as say
 from stridecast.live.browsing import Browsing
 from stridecast.live.building import Building
-from stridecast.live.exporting import write_motions, write_walk, write_ways
+from stridecast.live.exporting import write_figures, write_motions, write_walk, write_ways
 from stridecast.live.hall import Guest, Hall
 from stridecast.live.layout import CLAMPED
 from stridecast.live.outbox import Outbox
@@ -115,6 +115,7 @@ class Stage(threading.Thread):
         tell = self.outbox.tell
         walking = Walking(database, tell)
         self.database, self.name, self.walking = database, name, walking
+        self.guest.skeleton = database.skeleton
         self.scene = ScenePlay(
             database,
             tell,
@@ -137,7 +138,6 @@ class Stage(threading.Thread):
                 bounds=list(CLAMPED),
                 scene=dict(self.hall.scene),
                 limits=self.hall.limits,
-                glb=False,
             )
         )
 
@@ -322,18 +322,17 @@ class Stage(threading.Thread):
             if built is None:
                 raise InputError("no database has been built yet; upload recordings and build one")
             name, write = "own.safetensors", lambda path: save_database(built, path)
-        elif message.what == "glb":
-            raise InputError("this server cannot write GLB; choose BVH")
         elif self.mode == "walk":
             journey = self.walking.journey()
             name, write = f"walk.{message.what}", lambda path: write_walk(path, journey, message.what)
         elif self.mode == "database":
-            name, write = "clip.bvh", self._write_clip(message.what)
+            name, write = f"clip.{message.what}", self._write_clip(message.what)
         elif message.what == "csv":
             frames = self.scene.timeline.frames()
             name, write = "crowd.csv", lambda path: write_ways(path, frames)
         else:
-            name, write = "crowd.zip", self._write_crowd()
+            name = "crowd.zip" if message.what == "bvh" else "crowd.glb"
+            write = self._write_crowd(message.what)
         make = lambda: self._make(name, write, message.request)  # noqa: E731
         self._exporting = True
         threading.Thread(target=lambda: self._guarded("export", make, message.request), daemon=True).start()
@@ -353,11 +352,11 @@ class Stage(threading.Thread):
         motion = self.browsing.motion
         if motion is None:
             raise InputError("choose a segment, or mine for one, before it is saved")
-        if what != "bvh":
-            raise InputError("a clip is saved as BVH")
-        return lambda path: write_bvh(path, motion)
+        if what == "csv":
+            raise InputError("a clip is saved as BVH or GLB")
+        return lambda path: write_motion(path, motion)
 
-    def _write_crowd(self) -> Callable[[Path], None]:
+    def _write_crowd(self, what: str) -> Callable[[Path], None]:
         crowd = self.scene.crowd
         if crowd is None:
             raise InputError(
@@ -371,7 +370,8 @@ class Stage(threading.Thread):
             if done % max(1, total // 20) == 0:
                 self._tell_progress("export", done, total)
 
-        return lambda path: write_motions(path, frames, crowd, progress)
+        write = write_motions if what == "bvh" else write_figures
+        return lambda path: write(path, frames, crowd, progress)
 
     # playing
 

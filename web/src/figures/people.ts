@@ -156,11 +156,8 @@ function capsule(height: number): ReturnType<typeof merged> {
   const trunk = new CapsuleGeometry(0.2, height * 0.62, 4, 14).scale(1.05, 1, 0.72).translate(0, height * 0.42, 0);
   const head = new SphereGeometry(height * 0.066, 14, 10).translate(0, height * 0.925, 0.012);
   const chest = new SphereGeometry(0.11, 10, 8).scale(1.2, 1.5, 0.6).translate(0, height * 0.68, 0.115);
-  const parts = [trunk, head, chest].map((part) => {
-    const plainPart = part.index ? part : part;
-    plainPart.deleteAttribute("uv");
-    return plainPart;
-  });
+  const parts = [trunk, head, chest];
+  for (const part of parts) part.deleteAttribute("uv");
   return white(merged(parts));
 }
 

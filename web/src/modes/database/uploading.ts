@@ -2,7 +2,7 @@
 
 import type { LimitsPart } from "../../protocol";
 import { button } from "../../ui/controls";
-import { el, replace, setText } from "../../ui/dom";
+import { el, setText } from "../../ui/dom";
 import { icons } from "../../ui/icons";
 import { size } from "../exports";
 import type { Page } from "../mode";
@@ -187,7 +187,6 @@ export class Uploading {
     this.forgetButton.hidden = this.building || this.count === 0;
     this.useButton.hidden = !this.built || this.using;
     this.backButton.hidden = !this.using;
-    void replace;
   }
 }
 

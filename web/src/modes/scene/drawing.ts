@@ -71,7 +71,6 @@ export class SceneDrawing {
   private readonly sketches = new Group();
   private readonly cursor: Mesh;
   private movers: Mesh[] = [];
-  private moverRadii: number[] = [];
   /** Whether starts and goals of everybody are shown, or only of the chosen. */
   private everything = true;
 
@@ -164,7 +163,6 @@ export class SceneDrawing {
       this.group.remove(mesh);
       mesh.geometry.dispose();
     }
-    this.moverRadii = [...radii];
     this.movers = radii.map((radius) => {
       const mesh = solid(new CylinderGeometry(radius, radius, 0.8, 32), materials.mover);
       mesh.visible = false;
@@ -179,7 +177,6 @@ export class SceneDrawing {
       mesh.visible = 2 * i + 1 < places.length;
       if (mesh.visible) mesh.position.set(places[2 * i]!, 0.4, places[2 * i + 1]!);
     });
-    void this.moverRadii;
   }
 
   private strip(points: readonly Point[], width: number, material: Material, order: number): void {

@@ -299,7 +299,8 @@ export class Steering {
       this.padActive = true;
     } else if (this.padActive) {
       this.padActive = false;
-      this.events.wish({ kind: "force", frame: "world", force: [0, 0] }, now);
+      this.take("rest");
+      this.events.wish({ kind: "rest" }, now);
     }
     if (Math.hypot(turnX, turnY) > DEAD_ZONE) this.stage.cameras.rotate(turnX * 0.045, turnY * 0.03);
     pad.buttons.forEach((button, i) => {
