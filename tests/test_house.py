@@ -62,6 +62,7 @@ PUBLIC = [
     "save_trajectories",
     "walk_scene",
     "write_bvh",
+    "write_glb",
 ]
 """Every public name. A change here is a change for users: say so in CHANGELOG.md."""
 

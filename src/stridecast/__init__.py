@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         WishError,
     )
     from stridecast.formats.bvh import write_bvh
+    from stridecast.formats.glb import write_glb
     from stridecast.formats.recordings import load_motion, load_skeleton
     from stridecast.formats.scenes import load_scene, save_scene
     from stridecast.formats.store import load_database, save_database
@@ -61,6 +62,7 @@ _HOME = {
     "load_motion": "formats.recordings",
     "load_skeleton": "formats.recordings",
     "write_bvh": "formats.bvh",
+    "write_glb": "formats.glb",
     "Motion": "model.motion",
     "MotionDatabase": "model.database",
     "Pose": "model.pose",
@@ -110,6 +112,7 @@ __all__ = [  # noqa: RUF022
     "save_scene",
     "walk_scene",
     "write_bvh",
+    "write_glb",
     "Crowd",
     "dress",
     "load_trajectories",

@@ -248,6 +248,34 @@ def test_hostile_files_are_refused(tmp_path, change, words):
         load_motion(path)
 
 
+def test_what_would_fill_memory_is_refused(tmp_path, monkeypatch):
+    path = tmp_path / "a.glb"
+    write_glb(path, writhing(frames=50))
+
+    def again(document: Any) -> None:
+        document["animations"][0]["channels"] *= 40
+
+    data = path.read_bytes()
+    path.write_bytes(broken(data, again))
+    monkeypatch.setattr("stridecast.formats.gltf_reading.MOST_IN_ALL", 100_000)
+    with pytest.raises(FileError, match="more than 100000 numbers"):
+        read_glb(path)
+    monkeypatch.undo()
+    monkeypatch.setattr("stridecast.formats.glb_motion.MOST_POSES", 24 * 40)
+    path.write_bytes(data)
+    with pytest.raises(FileError, match="at most 40 are read"):
+        read_glb(path)
+
+    def deep(document: Any) -> None:
+        first = len(document["nodes"])
+        document["nodes"] += [{"children": [first + k + 1]} for k in range(50_000)] + [{"children": [0]}]
+
+    monkeypatch.undo()
+    path.write_bytes(broken(data, deep))
+    with pytest.raises(FileError, match="nested more than 1024 deep"):
+        read_glb(path)
+
+
 def test_times_that_lie_are_refused(tmp_path):
     turns, places = np.tile([0.0, 0, 0, 1], (3, 1)), np.zeros((3, 3))
     for times, words in (

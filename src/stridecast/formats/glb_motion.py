@@ -22,8 +22,8 @@ from stridecast.geometry import quaternions as quat
 Array = np.ndarray
 
 MOST_JOINTS = 1024
-MOST_FRAMES = 1 << 18
-"""Of what is read at most."""
+MOST_FRAMES, MOST_POSES = 1 << 18, 1 << 24
+"""Of what is read at most; poses are frames times joints."""
 
 RATES = (1.0, 1000.0)
 """Frames a second that are believed."""
@@ -214,16 +214,14 @@ class _Figure:
 
     def _tree(self, listed: list[int]) -> list[int]:
         """The joints that hang from the one with most of them, with the nodes that are between."""
-        parents, wanted = self.reader.parents, set(listed)
+        wanted = set(listed)
         if len(wanted) > MOST_JOINTS:
             self.reader.wrong(f"has a skeleton of {len(wanted)} joints; at most {MOST_JOINTS} are read")
         count: dict[int, int] = {}
         inside: set[int] = set()
         lines: dict[int, list[int]] = {}
         for joint in listed:
-            line = [joint]
-            while parents[line[-1]] >= 0:
-                line.append(int(parents[line[-1]]))
+            line = [joint, *self._over(joint)]
             top = max(k for k, node in enumerate(line) if node in wanted)
             lines[joint] = line[: top + 1]
             count[line[top]] = count.get(line[top], 0) + 1
@@ -268,20 +266,25 @@ class _Figure:
             rate = round(rate) if abs(rate - round(rate)) < 0.01 * rate else rate
             rate = float(np.clip(rate, *RATES))
         frames = round((last - first) * rate) + 1
-        if frames > MOST_FRAMES:
-            r.wrong(
-                f"has an animation of {last - first:g} s at {rate:g} frames a second; at most {MOST_FRAMES} are read"
-            )
+        most = min(MOST_FRAMES, MOST_POSES // len(self.joints))
+        if frames > most:
+            r.wrong(f"has an animation of {last - first:g} s at {rate:g} frames a second; at most {most} are read")
         return first + np.arange(frames) / rate, float(rate)
 
     def _above(self) -> list[int]:
         """Nodes over the root of the figure, the topmost first."""
+        return self._over(self.root)[::-1]
+
+    def _over(self, node: int) -> list[int]:
+        """Nodes over another, the nearest first."""
         line: list[int] = []
-        node = int(self.reader.parents[self.root])
-        while node >= 0:
-            line.append(node)
-            node = int(self.reader.parents[node])
-        return line[::-1]
+        parent = int(self.reader.parents[node])
+        while parent >= 0:
+            line.append(parent)
+            if len(line) > MOST_JOINTS:
+                self.reader.wrong(f"has nodes that are nested more than {MOST_JOINTS} deep")
+            parent = int(self.reader.parents[parent])
+        return line
 
     def _moved(self, node: int, path: str) -> Float[Array, "frames components"]:
         """A node's translation, or rotation as ``w x y z``, at each frame."""

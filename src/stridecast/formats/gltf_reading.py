@@ -24,8 +24,8 @@ LARGEST_JSON = 1 << 27
 """Bytes of JSON that are read at most."""
 
 MOST_NODES = 1 << 17
-MOST_NUMBERS = 1 << 27
-"""Numbers of one accessor that are read at most."""
+MOST_NUMBERS, MOST_IN_ALL = 1 << 22, 1 << 26
+"""Numbers of one accessor, and of all, that are read at most: a file may point at the same ones again and again."""
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDE = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
@@ -49,6 +49,7 @@ class GltfReader:
         self.path = path
         self._file = file
         self._start, self._size = 0, 0
+        self._read = 0
         self.document = self._open()
         self.parents = self._parents()
 
@@ -128,6 +129,9 @@ class GltfReader:
             self.wrong(f"{name} is empty")
         if count * wide > MOST_NUMBERS:
             self.wrong(f"{name} claims {count} entries; at most {MOST_NUMBERS // wide} are read")
+        self._read += count * wide
+        if self._read > MOST_IN_ALL:
+            self.wrong(f"has more than {MOST_IN_ALL} numbers in what would be read")
         if stride < tight or start + (count - 1) * stride + tight > length or first + length > self._size:
             self.wrong(f"{name} reaches beyond the numbers that the file has")
         self._file.seek(self._start + first + start)
