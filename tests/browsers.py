@@ -13,7 +13,7 @@ from playwright.sync_api import Page, WebSocket
 from stridecast.live.frames import decode
 from stridecast.live.layout import REPLAYED, STEERING, WALK
 
-PATIENCE = 30.0
+PATIENCE = 60.0
 """Seconds until what is waited for counts as missing."""
 
 

@@ -30,6 +30,8 @@ def test_what_cannot_be_served_is_refused(server, tmp_path):
     assert "cannot be read" in refused("demo", "--scene", tmp_path / "none.yaml", "--no-browser")
     assert f"port {server.port}" in refused("demo", "--no-browser", "--quiet", "--port", server.port)
     assert refused("live", "--port", 99999)
+    assert "an address is HOST:PORT" in refused("live", "--vmc", "nowhere:port", "--no-browser")
+    assert "there is no host" in refused("demo", "--vmc", "no.such.host.invalid:39539", "--no-browser")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import math
+import socket
 import threading
 import time
 from contextlib import ExitStack
@@ -158,6 +159,49 @@ def test_what_was_walked_is_saved(client, server):
         ready = client.until("export_ready", "error")
         assert (ready.type, ready.name, ready.request) == ("export_ready", name, 7)
         assert ready.url.startswith("/download/")
+
+
+def heard(receiver: socket.socket, until: float) -> tuple[float, float]:
+    """Time of the first frame from ``until`` on that a receiver of VMC hears, and how far ahead the hips are."""
+    osc_bundle = pytest.importorskip("pythonosc.osc_bundle", reason="python-osc decodes")
+    when = z = -1.0
+    while when < until:
+        for message in osc_bundle.OscBundle(receiver.recv(65536)):
+            said = list(message.params)
+            if message.address == "/VMC/Ext/T":
+                when = said[0]
+            elif said[0] == "Hips":
+                z = said[3]
+    return when, z
+
+
+def neighbours() -> tuple[socket.socket, socket.socket]:
+    """Two receivers at ports side by side."""
+    while True:
+        first, second = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        first.bind(("127.0.0.1", 0))
+        try:
+            second.bind(("127.0.0.1", first.getsockname()[1] + 1))
+        except (OSError, OverflowError):
+            first.close()
+            second.close()
+            continue
+        return first, second
+
+
+def test_walkers_are_played_to_receivers_a_port_each(learned):
+    with ExitStack() as stack:
+        receivers = [stack.enter_context(receiver) for receiver in neighbours()]
+        for receiver in receivers:
+            receiver.settimeout(20.0)
+        running = stack.enter_context(LiveServer(learned, port=0, receiver=receivers[0].getsockname()).running())
+        steered, left_alone = (Client(stack.enter_context(open_socket(running))) for _ in receivers)
+        wish(steered, "drive", direction=[0, 1])
+        left_alone.until("welcome")
+        frame = steered.until_frame(WALK, lambda f: place(f)[1] > 0.5)
+        when, z = heard(receivers[0], frame.time)
+        assert z == pytest.approx(place(frame)[1], abs=0.2 + 1.5 * (when - frame.time))
+        assert abs(heard(receivers[1], 0.3)[1]) < 0.2  # nobody steers the other
 
 
 # what is wrong is told, and changes nothing

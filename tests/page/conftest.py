@@ -6,12 +6,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, sync_playwright
 
 from browsers import Visitor
+from stridecast.crowd.crowd import Crowd
 from stridecast.live.serve import LiveServer
 from stridecast.model.database import MotionDatabase
+from stridecast.model.scene import Scene
 from stridecast.samples.library import sample_database
 
 FLAGS = (
@@ -29,7 +32,8 @@ def learned() -> MotionDatabase:
 
 @pytest.fixture(scope="session")
 def server(learned: MotionDatabase) -> Iterator[LiveServer]:
-    """A server on a free port."""
+    """A server on a free port; what it runs is compiled before anybody waits for it."""
+    Crowd(learned, Scene(start=np.zeros(2), goals=np.array([[0.0, 3.0]]))).step()
     with LiveServer(learned, port=0).running() as running:
         yield running
 

@@ -30,6 +30,14 @@ Port = Annotated[
         min=0, max=65535, metavar="N", help="Port; 8047, or any that is free, if left out.", show_default=False
     ),
 ]
+Vmc = Annotated[
+    str | None,
+    typer.Option(
+        metavar="HOST:PORT",
+        help="Play the walker to a receiver of the VMC protocol as well; of more clients each has the next port.",
+        show_default=False,
+    ),
+]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the address.")]
 
@@ -39,30 +47,44 @@ def live(
     scene: Scene = None,
     host: Host = None,
     port: Port = None,
+    vmc: Vmc = None,
     browser: Browser = True,
     quiet: Quiet = False,
 ) -> None:
     """Open the page: steer a walker by hand, draw scenes and watch crowds in them, look through the database."""
-    _serve(database, scene, host, port, browser, quiet)
+    _serve(database, scene, host, port, vmc, browser, quiet)
 
 
 def demo(
-    scene: Scene = None, host: Host = None, port: Port = None, browser: Browser = True, quiet: Quiet = False
+    scene: Scene = None,
+    host: Host = None,
+    port: Port = None,
+    vmc: Vmc = None,
+    browser: Browser = True,
+    quiet: Quiet = False,
 ) -> None:
     """Open the page with the sample database, which needs no recordings."""
-    _serve(None, scene, host, port, browser, quiet)
+    _serve(None, scene, host, port, vmc, browser, quiet)
 
 
 def _serve(
-    database: Path | None, scene: Path | None, host: str | None, port: int | None, browser: bool, quiet: bool
+    database: Path | None,
+    scene: Path | None,
+    host: str | None,
+    port: int | None,
+    vmc: str | None,
+    browser: bool,
+    quiet: bool,
 ) -> None:
     from stridecast.cli import screen
+    from stridecast.formats.vmc import parsed_address
     from stridecast.live.serve import LiveServer
 
+    receiver = None if vmc is None else parsed_address(vmc)
     place = None if scene is None else _scene(scene)
     learned = open_database(database, quiet=quiet)
     name = "sample database" if database is None else database.stem
-    server = LiveServer(learned, name, scene=place, host=host, port=port)
+    server = LiveServer(learned, name, scene=place, host=host, port=port, receiver=receiver)
     with screen.progress(quiet, {}):
         try:
             server.run(ready=lambda: _tell(server, browser=browser, quiet=quiet))

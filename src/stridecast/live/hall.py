@@ -8,7 +8,9 @@ import shutil
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from stridecast.live.downloads import Download, Downloads
@@ -20,18 +22,22 @@ from stridecast.model.skeleton import Skeleton
 MOST_SESSIONS = 8
 """So many clients are served at once."""
 
+EMPTY: Mapping[str, Any] = MappingProxyType({"version": 1})
+"""A scene with nothing in it."""
+
 BUNDLE = Path(__file__).parent / "static"
 """Where the page lies."""
 
 
 @dataclass(eq=False)
 class Guest:
-    """What a session keeps in files, and the skeleton of those whom it shows."""
+    """What a session keeps in files, the skeleton of those whom it shows, and its number among those who are there."""
 
     folder: Path
     uploads: Uploads
     downloads: Downloads
     skeleton: Skeleton
+    seat: int
 
 
 @dataclass(kw_only=True, eq=False)
@@ -52,15 +58,19 @@ class Hall:
         Threads that share the people of a crowd.
     bundle
         Folder of the page.
+    receiver
+        Host and port to which the walker of the first seat is played by the VMC protocol; that of the next goes to the
+        next port.
     """
 
     database: MotionDatabase
     name: str = "sample database"
-    scene: Mapping[str, Any] = field(default_factory=lambda: {"version": 1})
+    scene: Mapping[str, Any] = field(default_factory=lambda: EMPTY)
     limits: LimitsPart
     most_sessions: int = MOST_SESSIONS
     threads: int = field(default_factory=lambda: max(1, min(4, (os.cpu_count() or 1))))
     bundle: Path = BUNDLE
+    receiver: tuple[str, int] | None = None
     guests: dict[str, Guest] = field(default_factory=dict)
     _folder: tempfile.TemporaryDirectory[str] | None = None
 
@@ -75,8 +85,10 @@ class Hall:
             self._folder = tempfile.TemporaryDirectory(prefix="stridecast-live-")
         folder = Path(self._folder.name, secrets.token_hex(8))
         word = secrets.token_urlsafe(24)
+        taken = {guest.seat for guest in self.guests.values()}
+        seat = next(number for number in count() if number not in taken)
         self.guests[word] = Guest(
-            folder, Uploads(folder / "files", self.limits), Downloads(folder / "made"), self.database.skeleton
+            folder, Uploads(folder / "files", self.limits), Downloads(folder / "made"), self.database.skeleton, seat
         )
         return word
 

@@ -14,8 +14,9 @@ from typing import Any
 import uvicorn
 
 from stridecast.errors import InputError
+from stridecast.formats.vmc import VmcSender
 from stridecast.live.app import make_app
-from stridecast.live.hall import Hall
+from stridecast.live.hall import EMPTY, MOST_SESSIONS, Hall
 from stridecast.live.limits import usual_limits
 from stridecast.live.messages import LARGEST_MESSAGE, LimitsPart
 from stridecast.live.security import Rules
@@ -53,11 +54,14 @@ class LiveServer:
         What is taken of each client.
     most_sessions
         So many clients are served at once.
+    receiver
+        Host and port to which walkers are played by the VMC protocol, that of the first client; the next client's goes
+        to the next port.
 
     Raises
     ------
     InputError
-        It cannot listen there.
+        It cannot listen there, or there is no such receiver.
     """
 
     def __init__(
@@ -70,7 +74,10 @@ class LiveServer:
         port: int | None = None,
         limits: LimitsPart | None = None,
         most_sessions: int | None = None,
+        receiver: tuple[str, int] | None = None,
     ) -> None:
+        if receiver is not None:
+            VmcSender(*receiver).close()  # says what is wrong with it
         self.host = host or OWN
         self._socket = _listen(self.host, port)
         self.port: int = self._socket.getsockname()[1]
@@ -81,9 +88,14 @@ class LiveServer:
             token=self.token,
             addresses=self.token is not None,
         )
-        more = {} if most_sessions is None else {"most_sessions": most_sessions}
-        given = {} if scene is None else {"scene": dict(scene)}
-        self.hall = Hall(database=database, name=name, limits=limits or usual_limits(), **given, **more)  # type: ignore[arg-type]
+        self.hall = Hall(
+            database=database,
+            name=name,
+            scene=EMPTY if scene is None else dict(scene),
+            limits=limits or usual_limits(),
+            most_sessions=MOST_SESSIONS if most_sessions is None else most_sessions,
+            receiver=receiver,
+        )
         config = uvicorn.Config(
             make_app(self.hall, rules),
             log_level="error",

@@ -7,6 +7,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -17,6 +18,7 @@ from stridecast.errors import InputError
 from stridecast.formats.motion_files import write_motion
 from stridecast.formats.scenes import parse_scene, scene_of, scene_text, scene_values
 from stridecast.formats.store import load_database, save_database
+from stridecast.formats.vmc import VmcSender
 from stridecast.live import messages as say
 from stridecast.live.browsing import Browsing
 from stridecast.live.building import Building
@@ -74,6 +76,7 @@ class Stage(threading.Thread):
         self._build_request = 0
         self._built: MotionDatabase | None = None
         self._exporting = False
+        self._receiver: VmcSender | None = None
 
     def put(self, message: object) -> bool:
         """Hand over a message; False where too many wait."""
@@ -92,6 +95,13 @@ class Stage(threading.Thread):
 
     def run(self) -> None:
         """Play until stopped."""
+        with ExitStack() as stack:
+            if self.hall.receiver is not None:
+                host, port = self.hall.receiver
+                self._receiver = stack.enter_context(VmcSender(host, min(port + self.guest.seat, 65535)))
+            self._run()
+
+    def _run(self) -> None:
         self._guarded("database", lambda: self._use(self.hall.database, self.hall.name, built=False))
         if not hasattr(self, "walking"):  # the error has been told; there is nothing to be played with
             return
@@ -386,6 +396,8 @@ class Stage(threading.Thread):
     def _show(self, period: float, in_time: Callable[[], bool]) -> None:
         if self.mode == "walk":
             frame: bytes | None = self.walking.step()
+            if self._receiver is not None:
+                self._receiver.send(self.database.skeleton, self.walking.pose, self.walking.time)
         elif self.mode == "scene":
             frame = self.scene.step(period, in_time)
         else:

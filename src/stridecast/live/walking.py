@@ -127,6 +127,11 @@ class Walking:
         """Seconds that have been walked."""
         return self.frames / self.rate
 
+    @property
+    def pose(self) -> Pose:
+        """The newest pose."""
+        return self._poses[-1]
+
     def take(self, message: WishMessage | SettingsMessage | PlaceMessage) -> None:
         """Take over what the client wishes.
 

@@ -132,7 +132,7 @@ export class SceneMode implements Mode {
       draft: (draft) => this.drawing.sketch(draft?.points ?? [], draft ?? {}),
       say: (text) => this.page.messages.say(text),
     });
-    this.timeline = new Timeline(page.connection);
+    this.timeline = new Timeline(page.connection, () => this.sendWaiting());
     this.foot.append(this.problem, this.hint, this.timeline.element);
     this.problem.hidden = true;
     this.view = segmented<View>(
@@ -250,8 +250,14 @@ export class SceneMode implements Mode {
     this.sendTimer = setTimeout(() => this.sendScene(), SEND_AFTER);
   }
 
+  /** Send what has been edited a moment ago at once. */
+  private sendWaiting(): void {
+    if (this.sendTimer !== undefined) this.sendScene();
+  }
+
   private sendScene(): void {
     clearTimeout(this.sendTimer);
+    this.sendTimer = undefined;
     this.page.connection.send({ type: "scene", scene: this.scene, request: this.page.connection.nextRequest() });
   }
 

@@ -26,7 +26,11 @@ export class Timeline {
   private readonly counts = el("span", { class: "counts" });
   private scrubbing = false;
 
-  constructor(private readonly connection: Connection) {
+  /** `before` is done before anything plays, as what has been edited but not told yet must not be played over. */
+  constructor(
+    private readonly connection: Connection,
+    private readonly before: () => void = () => {},
+  ) {
     this.play = iconButton("Play", icons.play, () => this.toggle(), "Space");
     this.line.addEventListener("input", () => {
       this.scrubbing = true;
@@ -49,14 +53,17 @@ export class Timeline {
   }
 
   toggle(): void {
+    this.before();
     this.connection.send({ type: "playback", action: this.playing ? "pause" : "play" });
   }
 
   step(): void {
+    this.before();
     this.connection.send({ type: "playback", action: "step" });
   }
 
   restart(): void {
+    this.before();
     this.connection.send({ type: "playback", action: "restart" });
   }
 
