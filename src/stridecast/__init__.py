@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from stridecast.body.recasting import recast
     from stridecast.building.build import build
     from stridecast.crowd.crowd import Crowd
     from stridecast.crowd.dressing import dress
@@ -61,6 +62,7 @@ _HOME = {
     "load_motion": "formats.recordings",
     "load_skeleton": "formats.recordings",
     "write_bvh": "formats.bvh",
+    "recast": "body.recasting",
     "Motion": "model.motion",
     "MotionDatabase": "model.database",
     "Pose": "model.pose",
@@ -110,6 +112,7 @@ __all__ = [  # noqa: RUF022
     "save_scene",
     "walk_scene",
     "write_bvh",
+    "recast",
     "Crowd",
     "dress",
     "load_trajectories",

@@ -7,6 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from stridecast.cli.bodies import (
+    BvhFor,
+    BvhOrder,
+    BvhRest,
+    BvhRoot,
+    BvhUnit,
+    BvhUp,
+    CharacterOption,
+    bvh_written,
+    open_character,
+    played,
+)
 from stridecast.cli.databases import Database, open_database
 
 if TYPE_CHECKING:
@@ -45,6 +57,13 @@ def mine(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="OUT.bvh", help="The motion to write.", show_default=False)
     ] = None,
+    skeleton: CharacterOption = None,
+    bvh_for: BvhFor = None,
+    bvh_unit: BvhUnit = None,
+    bvh_order: BvhOrder = None,
+    bvh_up: BvhUp = None,
+    bvh_root: BvhRoot = None,
+    bvh_rest: BvhRest = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
 ) -> None:
@@ -63,6 +82,8 @@ def mine(
         if output.suffix.lower() != ".bvh":
             raise FileError("motion is written as *.bvh", path=output)
         check_place(output)
+    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
+    character = open_character(skeleton, output)
     wish = {name: _number(name, text) for name, text in (("speed", speed), ("turn", turn), ("style", style))}
     learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {}):
@@ -80,7 +101,7 @@ def mine(
     if output is not None:
         from stridecast.formats.bvh import write_bvh
 
-        write_bvh(output, mined.motion)
+        write_bvh(output, played(mined.motion, character, mined.planted), convention=convention)
     if as_json:
         screen.print_json(_as_json(mined, output))
     elif not quiet:

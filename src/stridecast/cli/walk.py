@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from stridecast.cli.bodies import (
+    BvhFor,
+    BvhOrder,
+    BvhRest,
+    BvhRoot,
+    BvhUnit,
+    BvhUp,
+    CharacterOption,
+    bvh_written,
+    open_character,
+    played,
+)
 from stridecast.cli.databases import Database, open_database
 
 if TYPE_CHECKING:
@@ -70,6 +82,13 @@ def walk(
     damping_ratio: Annotated[
         float | None, typer.Option(help="1 comes to rest at the point, less swings past it; else 1.")
     ] = None,
+    skeleton: CharacterOption = None,
+    bvh_for: BvhFor = None,
+    bvh_unit: BvhUnit = None,
+    bvh_order: BvhOrder = None,
+    bvh_up: BvhUp = None,
+    bvh_root: BvhRoot = None,
+    bvh_rest: BvhRest = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
@@ -81,7 +100,7 @@ def walk(
     from stridecast.errors import FileError
 
     _check(points, curve, path, scene, motion, speed, half_life, damping_ratio)
-    ways = (output, points, path, scene, database)
+    ways = (output, points, path, scene, database, skeleton)
     if trace is not None and trace.absolute() in {p.absolute() for p in ways if p}:
         raise FileError("the trace would overwrite another file of this walk", path=trace)
 
@@ -95,6 +114,8 @@ def walk(
     for place in (output, trace):
         if place is not None:
             check_place(place)
+    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
+    character = open_character(skeleton, output)
     how: dict[str, Any] = {"subject": subject, "frame_rate": rate, "size": size}
     if style is not None:
         how["style"] = _style(style)
@@ -112,12 +133,13 @@ def walk(
         learned = open_database(database, quiet=quiet)
         with screen.progress(quiet, words) as progress:
             journey = _followed(learned, stream, gains, how, progress)
+    journey = replace(journey, motion=played(journey.motion, character, journey.planted))
     if trace is None:
-        write_bvh(output, journey.motion)
+        write_bvh(output, journey.motion, convention=convention)
     else:
         with replacing(trace) as file:  # takes its place only once the motion has been written too
             file.write(trace_text(journey).encode())
-            write_bvh(output, journey.motion)
+            write_bvh(output, journey.motion, convention=convention)
     summary = _summary(journey, walked, output, trace)
     if as_json:
         screen.print_json(summary)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
 
 from stridecast.crowd.crowd import Crowd
@@ -45,8 +45,8 @@ class Performance:
         So many are there.
     arrived
         They left at their last stop, or stand there for good; else the end came first.
-    motion
-        Of their body, of its own height; nothing where the crowd has no bodies.
+    motion, planted
+        Of their body, of its own height, and which foot stands when; nothing where the crowd has no bodies.
     """
 
     number: int
@@ -55,6 +55,7 @@ class Performance:
     frames: int
     arrived: bool
     motion: Motion | None
+    planted: Bool[Array, "frames 2"] | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -178,6 +179,7 @@ class Baking:
             frames=film.frames,
             arrived=arrived,
             motion=film.motion(self.crowd.skeleton(number), rate, person.name) if bodies else None,
+            planted=film.planted[: film.frames] if bodies else None,
         )
 
     def _count(self, frame: CrowdFrame) -> None:
@@ -213,21 +215,25 @@ class _Film:
     frames: int = 0
     roots: Float[Array, "room 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     rotations: Array | None = None
+    planted: Bool[Array, "room 2"] = field(default_factory=lambda: np.zeros((0, 2), np.bool_))
 
     def add(self, frame: CrowdFrame, row: int) -> None:
-        if frame.roots is not None and frame.rotations is not None:
+        if frame.roots is not None and frame.rotations is not None and frame.planted is not None:
             if self.rotations is None or self.frames == len(self.roots):
                 self._grow(frame.rotations.shape[1])
             assert self.rotations is not None
             self.roots[self.frames], self.rotations[self.frames] = frame.roots[row], frame.rotations[row]
+            self.planted[self.frames] = frame.planted[row]
         self.frames += 1
 
     def _grow(self, joints: int) -> None:
         room = max(64, len(self.roots) + len(self.roots) // 2)
         roots, rotations = np.zeros((room, 3)), np.zeros((room, joints, 4), np.float32)
+        planted = np.zeros((room, 2), np.bool_)
         if self.rotations is not None:
             roots[: self.frames], rotations[: self.frames] = self.roots, self.rotations
-        self.roots, self.rotations = roots, rotations
+            planted[: self.frames] = self.planted
+        self.roots, self.rotations, self.planted = roots, rotations, planted
 
     def motion(self, skeleton: Skeleton, rate: float, name: str) -> Motion:
         assert self.rotations is not None

@@ -51,8 +51,8 @@ class DressedPerson:
         Number in the trajectories; who is gone for long and comes back is there several times.
     start
         Time of the first frame on the clock of the trajectories, seconds.
-    motion
-        Of the body; nothing where only tracks were asked for.
+    motion, planted
+        Of the body, and which foot stands when; nothing where only tracks were asked for.
     vehicle
         What the body follows, frame by frame.
     report
@@ -62,6 +62,7 @@ class DressedPerson:
     person: int
     start: float
     motion: Motion | None
+    planted: Bool[Array, "frames 2"] | None
     vehicle: VehicleState
     report: TrackReport
 
@@ -202,10 +203,15 @@ def _dressed(
         tracks = make_human(_some(trajectories, part), bounds, rate, noise=noise).tracks
         for first in range(0, len(tracks), AT_A_TIME):
             few = tracks[first : first + AT_A_TIME]
-            motions = repeat(None) if bodies is None else _motions(database, few, bounds, rate, heights, bodies)
-            for track, motion in zip(few, motions, strict=False):
+            motions = repeat((None, None)) if bodies is None else _motions(database, few, bounds, rate, heights, bodies)
+            for track, (motion, planted) in zip(few, motions, strict=False):
                 yield DressedPerson(
-                    person=track.person, start=track.start, motion=motion, vehicle=track.vehicle, report=track.report
+                    person=track.person,
+                    start=track.start,
+                    motion=motion,
+                    planted=planted,
+                    vehicle=track.vehicle,
+                    report=track.report,
                 )
         if progress is not None:
             progress(part.stop, len(trajectories))
@@ -251,8 +257,8 @@ def _motions(
     rate: float,
     heights: Mapping[int, float],
     bodies: Bodies,
-) -> Iterator[Motion]:
-    """Bodies for some tracks; all begin in the same step, whatever their clocks say."""
+) -> Iterator[tuple[Motion, Bool[Array, "frames 2"]]]:
+    """Bodies for some tracks, and which of their feet stand; all begin in the same step, whatever their clocks say."""
     lengths = np.array([len(track) for track in tracks])
     count, longest, joints = len(tracks), int(lengths.max()), database.skeleton.joints
     vehicles = np.zeros((longest, count, 7))
@@ -274,6 +280,7 @@ def _motions(
     )
     roots = np.zeros((count, longest, 3))
     rotations = np.zeros((count, longest, joints, 4), np.float32)
+    planted = np.zeros((count, longest, 2), np.bool_)
     for k in range(longest):
         rows = np.flatnonzero(lengths > k)
         now = vehicles[k, rows]
@@ -284,9 +291,10 @@ def _motions(
             rests[k, rows],
         )
         roots[rows, k], rotations[rows, k] = bodies.roots[rows], bodies.rotations[rows]
+        planted[rows, k] = bodies.planted[rows]
     for k, (track, end) in enumerate(zip(tracks, lengths.tolist(), strict=True)):
         skeleton = scaled_to(database.skeleton, heights.get(track.person))
-        yield filmed(roots[k, :end], rotations[k, :end], skeleton, rate, str(track.person))
+        yield filmed(roots[k, :end], rotations[k, :end], skeleton, rate, str(track.person)), planted[k, :end]
 
 
 def rests_of(speeds: Float[Array, "frames"], rate: float) -> Float[Array, "frames"]:

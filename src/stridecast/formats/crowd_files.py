@@ -17,6 +17,7 @@ from jaxtyping import Float, Int
 
 from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
+from stridecast.formats.bvh_conventions import BvhConvention
 from stridecast.formats.files import check_place
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
 from stridecast.geometry import ground
@@ -113,6 +114,8 @@ class CrowdFiles:
     ----------
     output
         A name as above.
+    convention
+        How BVH is written (see ``write_bvh``).
 
     Raises
     ------
@@ -120,8 +123,9 @@ class CrowdFiles:
         Another ending, or the file system refuses.
     """
 
-    def __init__(self, output: str | Path) -> None:
+    def __init__(self, output: str | Path, convention: str | BvhConvention = "plain") -> None:
         self.output = Path(output)
+        self.convention = convention
         self.bodies = kind_of(self.output) == ".bvh"
         self.table = self.output.with_suffix(".csv") if self.bodies else self.output
         self.index = self.output.with_suffix(".people.csv") if self.bodies else None
@@ -179,7 +183,7 @@ class CrowdFiles:
     def add_motion(self, number: int, name: str, start: float, motion: Motion, height: float) -> Path:
         """Write somebody's motion and its row of the index; ``start`` in seconds, ``height`` in metres."""
         path = self._place_of(number, name)
-        write_bvh(path, motion)
+        write_bvh(path, motion, convention=self.convention)
         self.motions.append(path)
         row = (number, name, f"{start:.9f}", f"{motion.seconds:.9f}", motion.frames, f"{height:.3f}", path.name)
         self._parts[1].add(_csv_row(row))
