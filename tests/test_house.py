@@ -56,6 +56,7 @@ PUBLIC = [
     "load_skeleton",
     "load_trajectories",
     "mine",
+    "recast",
     "sample_database",
     "save_database",
     "save_scene",

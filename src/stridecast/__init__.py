@@ -14,6 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from stridecast.body.recasting import recast
     from stridecast.building.build import build
     from stridecast.crowd.crowd import Crowd
     from stridecast.crowd.dressing import dress
@@ -63,6 +64,7 @@ _HOME = {
     "load_skeleton": "formats.recordings",
     "write_bvh": "formats.bvh",
     "write_glb": "formats.glb",
+    "recast": "body.recasting",
     "Motion": "model.motion",
     "MotionDatabase": "model.database",
     "Pose": "model.pose",
@@ -113,6 +115,7 @@ __all__ = [  # noqa: RUF022
     "walk_scene",
     "write_bvh",
     "write_glb",
+    "recast",
     "Crowd",
     "dress",
     "load_trajectories",

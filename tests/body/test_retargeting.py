@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bodies import humanoid, writhing
+from characters import posed_at_rest
 from stridecast.analysis.contacts import find_contacts
 from stridecast.body import kinematics
 from stridecast.body.retargeting import retarget, same_skeleton
@@ -36,17 +37,6 @@ def walking(frames: int = 40, seed: int = 0, skeleton: Skeleton | None = None) -
     for role in ("chest", "neck", "head", "left_forearm", "right_hand"):
         rotations[:, motion.skeleton.joint(role)] = wild[:, motion.skeleton.joint(role)]
     return replace(motion, rotations=rotations)
-
-
-def posed_at_rest(skeleton: Skeleton, turns: dict[str, tuple[float, float, float]]) -> Skeleton:
-    """The same body whose rest pose is another: joints turned there, all frames still those of the world."""
-    rotations = np.tile(quat.IDENTITY, (skeleton.joints, 1))
-    for role, vector in turns.items():
-        rotations[skeleton.joint(role)] = quat.exp(np.array(vector))
-    world = kinematics.forward(skeleton, np.zeros(3), rotations)
-    offsets = world.positions - world.positions[np.maximum(skeleton.parents, 0)]
-    ends = quat.rotate(world.rotations[skeleton.end_joints], skeleton.end_offsets)
-    return replace(skeleton, offsets=offsets, end_offsets=ends)
 
 
 ARMS_DOWN = posed_at_rest(humanoid(), {"left_upper_arm": (0.0, 0.0, -1.4), "right_upper_arm": (0.0, 0.0, 1.4)})

@@ -202,7 +202,7 @@ def _check_slides(recording: RawRecording, skeleton: Skeleton, unit: float, befo
 
 
 def _without_t_pose(motion: Motion, notes: list[str]) -> Motion:
-    """Drop a first frame from which no human movement leads to the second.
+    """Drop a first frame that is exactly the rest pose, or from which no human movement leads to the second.
 
     Several joints at once turn three times further than they ever do in the second that follows, and by far more than a
     moment allows; or the root leaps once and never again.
@@ -211,6 +211,9 @@ def _without_t_pose(motion: Motion, notes: list[str]) -> Motion:
     q, places = motion.rotations[start], motion.root_positions[start]
     if len(q) < 3:
         return motion
+    if not q[0, :, 1:].any() and q[1, :, 1:].any():
+        notes.append("the first frame is left out: it is the rest pose")
+        return motion.clip(1, motion.frames)
     turns = np.linalg.norm(quat.log(quat.multiply(q[1:], quat.inverse(q[:-1]))), axis=-1)
     speeds = np.linalg.norm(np.diff(places, axis=0), axis=-1) * motion.frame_rate
     least = np.maximum(3.0 * turns[1:].max(axis=0), max(0.25, 10.0 / motion.frame_rate))

@@ -7,6 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from stridecast.cli.bodies import (
+    BvhFor,
+    BvhOrder,
+    BvhRest,
+    BvhRoot,
+    BvhUnit,
+    BvhUp,
+    CharacterOption,
+    bvh_written,
+    height_of,
+    open_character,
+    played,
+)
 from stridecast.cli.databases import DatabaseOption, open_database
 
 if TYPE_CHECKING:
@@ -40,6 +53,13 @@ def crowd(
     compact: Annotated[
         bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
     ] = False,
+    skeleton: CharacterOption = None,
+    bvh_for: BvhFor = None,
+    bvh_unit: BvhUnit = None,
+    bvh_order: BvhOrder = None,
+    bvh_up: BvhUp = None,
+    bvh_root: BvhRoot = None,
+    bvh_rest: BvhRest = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
@@ -59,7 +79,9 @@ def crowd(
     if seed is not None and not 0 <= seed < 2**32:
         raise InputError(f"--seed must be a whole number from 0 to {2**32 - 1}, not {seed}")
     place = load_scene(scene)
-    files = CrowdFiles(output, movers=len(place.movers), compact=compact)
+    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
+    files = CrowdFiles(output, movers=len(place.movers), convention=convention, compact=compact)
+    character = open_character(skeleton, output)
     learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {"ways": "finding ways", "bake": "walking"}) as progress:
         people = Crowd(
@@ -77,11 +99,13 @@ def crowd(
                 for baked in baking:
                     _write_frame(files, baked.frame)
                     for one in baked.finished:
-                        if one.motion is not None:
-                            height = people.height(one.number)
-                            files.add_motion(
-                                one.number, one.person.name, one.start, one.motion, height, planted=one.planted
-                            )
+                        if one.motion is None or one.planted is None:
+                            continue
+                        height = people.height(one.number)
+                        if character is not None:
+                            height = height_of(character, one.motion.skeleton)
+                        motion = played(one.motion, character, one.planted)
+                        files.add_motion(one.number, one.person.name, one.start, motion, height, planted=one.planted)
                     done = baking.tally.frames
                     progress("bake", done, done if baked.last else baking.frames)
         finally:

@@ -8,12 +8,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from stridecast.cli.bodies import (
+    BvhFor,
+    BvhOrder,
+    BvhRest,
+    BvhRoot,
+    BvhUnit,
+    BvhUp,
+    CharacterOption,
+    bvh_written,
+    height_of,
+    open_character,
+    played,
+)
 from stridecast.cli.databases import DatabaseOption, open_database
 
 if TYPE_CHECKING:
     from stridecast.crowd.dressing import DressedPerson
     from stridecast.crowd.human import TrackReport
     from stridecast.formats.crowd_files import CrowdFiles
+    from stridecast.model.skeleton import Skeleton
 
 WORST_SHOWN = 3
 """So many people are named whose trajectories no person could have walked."""
@@ -51,6 +65,13 @@ def dress(
     compact: Annotated[
         bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
     ] = False,
+    skeleton: CharacterOption = None,
+    bvh_for: BvhFor = None,
+    bvh_unit: BvhUnit = None,
+    bvh_order: BvhOrder = None,
+    bvh_up: BvhUp = None,
+    bvh_root: BvhRoot = None,
+    bvh_rest: BvhRest = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a report as JSON.")] = False,
 ) -> None:
@@ -67,12 +88,15 @@ def dress(
 
     if threads < 1:
         raise InputError(f"at least 1 thread is needed, not {threads}")
-    files = CrowdFiles(output, compact=compact)
+    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
+    files = CrowdFiles(output, convention=convention, compact=compact)
+    character = open_character(skeleton, output)
     if trajectories.absolute() in {path.absolute() for path in files.files}:
         raise FileError("would be overwritten by the result; name another output", path=trajectories)
     with screen.progress(quiet, {}):  # for what the package has to say about the file
         source = load_trajectories(trajectories, frame_rate=input_rate, unit=unit, format=format)
     learned = open_database(database, quiet=quiet)
+    tall = height or stature(learned.skeleton) if character is None else height_of(character, learned.skeleton)
     people: list[dict[str, Any]] = []
     reports: list[TrackReport] = []
     with screen.progress(quiet, {"dress": "dressing rows"}) as progress:
@@ -90,7 +114,7 @@ def dress(
             with files:
                 for one in each:
                     reports.append(one.report)
-                    people.append(_write(files, one, height or stature(learned.skeleton), rate or learned.frame_rate))
+                    people.append(_write(files, one, character, tall, rate or learned.frame_rate))
         finally:
             if files.kept:
                 screen.tell_kept(files.kept, files.motions)
@@ -101,7 +125,9 @@ def dress(
         _tell(report, files)
 
 
-def _write(files: CrowdFiles, one: DressedPerson, height: float, rate: float) -> dict[str, Any]:
+def _write(
+    files: CrowdFiles, one: DressedPerson, character: Skeleton | None, height: float, rate: float
+) -> dict[str, Any]:
     """Write somebody down; what there is to say of them."""
     import numpy as np
 
@@ -110,8 +136,9 @@ def _write(files: CrowdFiles, one: DressedPerson, height: float, rate: float) ->
     ids = np.full(one.frames, one.person)
     files.add_rows(ids, times, v.position, np.asarray(v.heading), np.linalg.norm(v.velocity, axis=-1))
     file = None
-    if one.motion is not None:
-        file = str(files.add_motion(one.person, str(one.person), one.start, one.motion, height, planted=one.planted))
+    if one.motion is not None and one.planted is not None:
+        motion = played(one.motion, character, one.planted)
+        file = str(files.add_motion(one.person, str(one.person), one.start, motion, height, planted=one.planted))
     return {"person": one.person, "start": one.start, "frames": one.frames, "file": file, **asdict(one.report)}
 
 

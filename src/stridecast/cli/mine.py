@@ -7,6 +7,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from stridecast.cli.bodies import (
+    BvhFor,
+    BvhOrder,
+    BvhRest,
+    BvhRoot,
+    BvhUnit,
+    BvhUp,
+    CharacterOption,
+    bvh_written,
+    open_character,
+    played,
+)
 from stridecast.cli.databases import Database, open_database
 
 if TYPE_CHECKING:
@@ -51,6 +63,13 @@ def mine(
     compact: Annotated[
         bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
     ] = False,
+    skeleton: CharacterOption = None,
+    bvh_for: BvhFor = None,
+    bvh_unit: BvhUnit = None,
+    bvh_order: BvhOrder = None,
+    bvh_up: BvhUp = None,
+    bvh_root: BvhRoot = None,
+    bvh_rest: BvhRest = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
 ) -> None:
@@ -65,6 +84,8 @@ def mine(
 
     if output is not None:
         check_motion_place(output, compact=compact)
+    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
+    character = open_character(skeleton, output)
     wish = {name: _number(name, text) for name, text in (("speed", speed), ("turn", turn), ("style", style))}
     learned = open_database(database, quiet=quiet)
     with screen.progress(quiet, {}):
@@ -80,7 +101,8 @@ def mine(
             seconds=seconds,
         )
     if output is not None:
-        write_motion(output, mined.motion, planted=mined.planted, compact=compact)
+        motion = played(mined.motion, character, mined.planted)
+        write_motion(output, motion, planted=mined.planted, compact=compact, convention=convention)
     if as_json:
         screen.print_json(_as_json(mined, output))
     elif not quiet:

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from stridecast.cli.bodies import (
+    BvhFor,
+    BvhOrder,
+    BvhRest,
+    BvhRoot,
+    BvhUnit,
+    BvhUp,
+    CharacterOption,
+    bvh_written,
+    open_character,
+    played,
+)
 from stridecast.cli.databases import Database, open_database
 
 if TYPE_CHECKING:
@@ -80,6 +92,13 @@ def walk(
     compact: Annotated[
         bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
     ] = False,
+    skeleton: CharacterOption = None,
+    bvh_for: BvhFor = None,
+    bvh_unit: BvhUnit = None,
+    bvh_order: BvhOrder = None,
+    bvh_up: BvhUp = None,
+    bvh_root: BvhRoot = None,
+    bvh_rest: BvhRest = None,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
@@ -93,7 +112,7 @@ def walk(
     if output is None and vmc is None:
         raise InputError("name a file to write with --output, or a receiver with --vmc")
     _check(points, curve, path, scene, motion, speed, half_life, damping_ratio)
-    ways = (output, points, path, scene, database)
+    ways = (output, points, path, scene, database, skeleton)
     if trace is not None and trace.absolute() in {p.absolute() for p in ways if p}:
         raise FileError("the trace would overwrite another file of this walk", path=trace)
 
@@ -107,6 +126,8 @@ def walk(
     if trace is not None:
         check_place(trace)
     sender = None if vmc is None else _sender(vmc)
+    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
+    character = open_character(skeleton, output)
     how: dict[str, Any] = {"subject": subject, "frame_rate": rate, "size": size}
     if style is not None:
         how["style"] = _style(style)
@@ -124,11 +145,12 @@ def walk(
         learned = open_database(database, quiet=quiet)
         with screen.progress(quiet, words) as progress:
             journey = _followed(learned, stream, gains, how, progress)
+    journey = replace(journey, motion=played(journey.motion, character, journey.planted))
     with replacing(trace) if trace is not None else nullcontext() as file:
         if file is not None:  # takes its place only once the motion has been written too
             file.write(trace_text(journey).encode())
         if output is not None:
-            write_motion(output, journey.motion, planted=journey.planted, compact=compact)
+            write_motion(output, journey.motion, planted=journey.planted, compact=compact, convention=convention)
     if sender is not None:
         with sender, screen.progress(quiet, {"play": "playing"}) as progress:
             _play(sender, journey.motion, progress)

@@ -45,10 +45,8 @@ class Performance:
         So many are there.
     arrived
         They left at their last stop, or stand there for good; else the end came first.
-    motion
-        Of their body, of its own height; nothing where the crowd has no bodies.
-    planted
-        Which feet stand at which frame, likewise.
+    motion, planted
+        Of their body, of its own height, and which foot stands when; nothing where the crowd has no bodies.
     """
 
     number: int
@@ -216,17 +214,16 @@ class _Film:
     start: float
     frames: int = 0
     roots: Float[Array, "room 3"] = field(default_factory=lambda: np.zeros((0, 3)))
-    planted: Bool[Array, "room 2"] = field(default_factory=lambda: np.zeros((0, 2), np.bool_))
     rotations: Array | None = None
+    planted: Bool[Array, "room 2"] = field(default_factory=lambda: np.zeros((0, 2), np.bool_))
 
     def add(self, frame: CrowdFrame, row: int) -> None:
-        if frame.roots is not None and frame.rotations is not None:
+        if frame.roots is not None and frame.rotations is not None and frame.planted is not None:
             if self.rotations is None or self.frames == len(self.roots):
                 self._grow(frame.rotations.shape[1])
             assert self.rotations is not None
             self.roots[self.frames], self.rotations[self.frames] = frame.roots[row], frame.rotations[row]
-            if frame.planted is not None:
-                self.planted[self.frames] = frame.planted[row]
+            self.planted[self.frames] = frame.planted[row]
         self.frames += 1
 
     def _grow(self, joints: int) -> None:

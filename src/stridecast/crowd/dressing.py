@@ -51,10 +51,8 @@ class DressedPerson:
         Number in the trajectories; who is gone for long and comes back is there several times.
     start
         Time of the first frame on the clock of the trajectories, seconds.
-    motion
-        Of the body; nothing where only tracks were asked for.
-    planted
-        Which of its feet stand at which frame, likewise.
+    motion, planted
+        Of the body, and which foot stands when; nothing where only tracks were asked for.
     vehicle
         What the body follows, frame by frame.
     report
@@ -261,7 +259,7 @@ def _motions(
     heights: Mapping[int, float],
     bodies: Bodies,
 ) -> Iterator[tuple[Motion, Bool[Array, "frames 2"]]]:
-    """Bodies for some tracks, and when their feet stand; all begin in the same step, whatever their clocks say."""
+    """Bodies for some tracks, and which of their feet stand; all begin in the same step, whatever their clocks say."""
     lengths = np.array([len(track) for track in tracks])
     count, longest, joints = len(tracks), int(lengths.max()), database.skeleton.joints
     vehicles = np.zeros((longest, count, 7))

@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Float
 
 from stridecast.body.rig import RawRecording
-from stridecast.errors import FileError, InputError
+from stridecast.errors import FileError
+from stridecast.formats.bvh_conventions import BvhConvention, bvh_convention, in_convention
 from stridecast.formats.bvh_hierarchy import BvhJoint, depth_first, hierarchy_text, read_hierarchy
 from stridecast.formats.files import looks_like, read_text, replacing
 from stridecast.formats.numbers import Numbers, parse_numbers
@@ -180,7 +181,14 @@ def _posed(joints: list[BvhJoint], values: Float[np.ndarray, "frames channels"],
     )
 
 
-def write_bvh(path: str | Path, motion: Motion, *, order: str = "ZYX", scale: float = 1.0) -> None:
+def write_bvh(
+    path: str | Path,
+    motion: Motion,
+    *,
+    convention: str | BvhConvention = "plain",
+    order: str | None = None,
+    scale: float | None = None,
+) -> None:
     """Write a motion as a BVH file that reads back to within 1e-6 m and rad.
 
     Parameters
@@ -188,36 +196,43 @@ def write_bvh(path: str | Path, motion: Motion, *, order: str = "ZYX", scale: fl
     path
         The file. It is written beside its place and then renamed, so what was there stays whole until the end.
     motion
-        The motion. The root's OFFSET is written as zero, its position channels are its place.
+        The motion. The root's position channels are its place, whatever its OFFSET.
+    convention
+        For which program: ``"plain"``, ``"blender"``, ``"motionbuilder"``, ``"unreal"`` (see ``BVH_CONVENTIONS``), or
+        a ``BvhConvention`` of your own.
     order
-        Order of the rotation channels, each of ``X``, ``Y``, ``Z`` once. Angles run on from frame to frame, without
-        jumps by a turn.
+        Order of the rotation channels, each of ``X``, ``Y``, ``Z`` once; else that of the convention. Angles run on
+        from frame to frame, without jumps by a turn.
     scale
-        Metres per unit of the file: 0.01 writes centimetres.
+        Metres per unit of the file, 0.01 writes centimetres; else that of the convention.
 
     Raises
     ------
     FileError
         The file system refuses (no such folder, no right, disk full).
     InputError
-        An order or a scale that is none.
+        A convention, an order or a scale that is none.
+    SkeletonError
+        The convention wants a joint on the floor, and the skeleton has another one of that name.
     """
-    order = order.upper()
-    if sorted(order) != ["X", "Y", "Z"]:
-        raise InputError(f"the order of rotations must have X, Y and Z once each, not {order!r}")
-    if not (np.isfinite(scale) and scale > 0):
-        raise InputError(f"the scale must be a positive number of metres per unit, not {scale}")
-    skeleton = motion.skeleton
-    angles = np.degrees(_steady_angles(motion.rotations[:, depth_first(skeleton)], order))
-    values = np.concatenate(
-        (np.round(motion.root_positions / scale, 8), np.round(angles.reshape(motion.frames, -1), 6)), axis=1
-    )
-    values += 0.0  # no minus before a zero
-    row = " ".join(["%.8f"] * 3 + ["%.6f"] * (3 * skeleton.joints)) + "\n"
+    how = bvh_convention(convention, order=order, scale=scale)
+    recording = in_convention(motion, how)
+    joints = depth_first(recording.parents.tolist())
+    angles = np.degrees(_steady_angles(recording.rotations, how.order))
+    columns, formats = [], []
+    for joint in joints:
+        places = recording.root_positions if joint == 0 else recording.slides.get(joint)
+        if places is not None:
+            columns.append(np.round(places, 8))
+            formats += ["%.8f"] * 3
+        columns.append(np.round(angles[:, joint], 6))
+        formats += ["%.6f"] * 3
+    values = np.concatenate(columns, axis=1) + 0.0  # no minus before a zero
+    row = " ".join(formats) + "\n"
     with replacing(path) as file:
-        file.write(hierarchy_text(skeleton, order, scale).encode())
-        file.write(f"MOTION\nFrames: {motion.frames}\nFrame Time: {1.0 / motion.frame_rate:.10g}\n".encode())
-        for start in range(0, motion.frames, _FRAMES_AT_A_TIME):
+        file.write(hierarchy_text(recording, how.order).encode())
+        file.write(f"MOTION\nFrames: {len(values)}\nFrame Time: {1.0 / motion.frame_rate:.10g}\n".encode())
+        for start in range(0, len(values), _FRAMES_AT_A_TIME):
             block = values[start : start + _FRAMES_AT_A_TIME].tolist()
             file.write("".join([row % tuple(frame) for frame in block]).encode())
 

@@ -10,8 +10,8 @@ from typing import NoReturn
 
 import numpy as np
 
+from stridecast.body.rig import RawRecording
 from stridecast.errors import FileError
-from stridecast.model.skeleton import Skeleton
 
 MOST_JOINTS = 4096
 DEEPEST = 256
@@ -162,11 +162,11 @@ class _Reader:
         self.open.pop()
 
 
-def depth_first(skeleton: Skeleton) -> list[int]:
-    """Joints in the order in which nested braces name them."""
-    children: list[list[int]] = [[] for _ in skeleton.names]
-    for joint in range(skeleton.joints - 1, 0, -1):
-        children[skeleton.parents[joint]].append(joint)
+def depth_first(parents: Sequence[int]) -> list[int]:
+    """Joints in the order in which nested braces name them; parents before children."""
+    children: list[list[int]] = [[] for _ in parents]
+    for joint in range(len(parents) - 1, 0, -1):
+        children[parents[joint]].append(joint)
     order, waiting = [], [0]
     while waiting:
         order.append(waiting.pop())
@@ -174,32 +174,33 @@ def depth_first(skeleton: Skeleton) -> list[int]:
     return order
 
 
-def hierarchy_text(skeleton: Skeleton, order: str, unit: float) -> str:
-    """Write a skeleton: joints ``depth_first``, lengths in units of ``unit`` metres, rotation channels in this order.
+def hierarchy_text(recording: RawRecording, order: str) -> str:
+    """Write joints ``depth_first``, offsets as they are, rotation channels in this order.
 
-    The root's offset is zero. A joint without children or end has an End Site of no length, as many programs want one.
+    The root and joints that slide have position channels. A joint without children or end has an End Site of no length,
+    as many programs want one.
     """
     turns = " ".join(f"{axis}rotation" for axis in order)
     ends: dict[int, list[np.ndarray]] = {}
-    for joint, end in zip(skeleton.end_joints, skeleton.end_offsets, strict=True):
+    for joint, end in zip(recording.end_joints, recording.end_offsets, strict=True):
         ends.setdefault(int(joint), []).append(end)
-    parents = set(skeleton.parents.tolist())
-    depths = np.zeros(skeleton.joints, np.int64)
+    parents = recording.parents.tolist()
+    depths = [0] * len(parents)
     rows, depth = ["HIERARCHY"], 0
-    for joint in depth_first(skeleton):
+    for joint in depth_first(parents):
         if joint > 0:
-            depths[joint] = depths[skeleton.parents[joint]] + 1
-        rows += _closing(depth, int(depths[joint]))
-        depth = int(depths[joint])
+            depths[joint] = depths[parents[joint]] + 1
+        rows += _closing(depth, depths[joint])
+        depth = depths[joint]
         tabs = "\t" * depth
-        name = re.sub(r"[\s{}]+", "_", skeleton.names[joint])
+        name = re.sub(r"[\s{}]+", "_", recording.names[joint])
         rows += [f"{tabs}{'JOINT' if depth else 'ROOT'} {name}", f"{tabs}{{"]
         depth += 1
-        offset = skeleton.offsets[joint] if joint > 0 else np.zeros(3)
-        rows.append(f"{tabs}\t{_offset(offset / unit)}")
-        rows.append(f"{tabs}\tCHANNELS {'3' if joint > 0 else '6 Xposition Yposition Zposition'} {turns}")
+        rows.append(f"{tabs}\t{_offset(recording.offsets[joint])}")
+        moves = joint == 0 or joint in recording.slides
+        rows.append(f"{tabs}\tCHANNELS {'6 Xposition Yposition Zposition' if moves else '3'} {turns}")
         for end in ends.get(joint, [] if joint in parents else [np.zeros(3)]):
-            rows += [f"{tabs}\tEnd Site", f"{tabs}\t{{", f"{tabs}\t\t{_offset(end / unit)}", f"{tabs}\t}}"]
+            rows += [f"{tabs}\tEnd Site", f"{tabs}\t{{", f"{tabs}\t\t{_offset(end)}", f"{tabs}\t}}"]
     return "\n".join([*rows, *_closing(depth, 0)]) + "\n"
 
 

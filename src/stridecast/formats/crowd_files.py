@@ -20,6 +20,7 @@ from jaxtyping import Float, Int
 from stridecast.body.mannequin import mannequin
 from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
+from stridecast.formats.bvh_conventions import BvhConvention
 from stridecast.formats.files import check_place
 from stridecast.formats.glb import GlbCrowd, Planted, check_compact
 from stridecast.formats.trajectories import load_trajectories
@@ -132,6 +133,8 @@ class CrowdFiles:
         So many obstacles move.
     compact
         Write a GLB with rotations of 16 bits (see ``write_glb``).
+    convention
+        How BVH is written (see ``write_bvh``).
 
     Raises
     ------
@@ -139,10 +142,18 @@ class CrowdFiles:
         Another ending, or the file system refuses.
     """
 
-    def __init__(self, output: str | Path, *, movers: int = 0, compact: bool = False) -> None:
+    def __init__(
+        self,
+        output: str | Path,
+        *,
+        movers: int = 0,
+        convention: str | BvhConvention = "plain",
+        compact: bool = False,
+    ) -> None:
         self.output = Path(output)
         kind = kind_of(self.output)
         check_compact(self.output, compact)
+        self.convention = convention
         self.bodies = kind == ".bvh" or kind in SCENES
         self.table = self.output.with_suffix(".csv") if self.bodies else self.output
         self.movers = movers_of(self.output) if movers else None
@@ -261,7 +272,7 @@ class CrowdFiles:
                 scene.add(motion, name=name, start=start, skin=mannequin)
             return self.output
         path = self._place_of(number, name)
-        write_bvh(path, motion)
+        write_bvh(path, motion, convention=self.convention)
         self.motions.append(path)
         row = (number, name, f"{start:.9f}", f"{motion.seconds:.9f}", motion.frames, f"{height:.3f}", path.name)
         self._parts[1].add(_csv_row(row))

@@ -7,6 +7,7 @@ from pathlib import Path
 from stridecast.body.mannequin import mannequin
 from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
+from stridecast.formats.bvh_conventions import BvhConvention
 from stridecast.formats.files import check_place
 from stridecast.formats.glb import Planted, check_compact, write_glb
 from stridecast.formats.usd import ENDINGS as USD
@@ -35,7 +36,14 @@ def check_motion_place(path: str | Path, *, compact: bool = False) -> None:
     check_place(path)
 
 
-def write_motion(path: str | Path, motion: Motion, *, planted: Planted | None = None, compact: bool = False) -> None:
+def write_motion(
+    path: str | Path,
+    motion: Motion,
+    *,
+    planted: Planted | None = None,
+    compact: bool = False,
+    convention: str | BvhConvention = "plain",
+) -> None:
     """Write a motion as BVH, GLB or USD; errors are those of ``check_motion_place``.
 
     Parameters
@@ -48,6 +56,8 @@ def write_motion(path: str | Path, motion: Motion, *, planted: Planted | None = 
         Which feet stand at which frame; a GLB tells it.
     compact
         A GLB with rotations of 16 bits (see ``write_glb``).
+    convention
+        How BVH is written (see ``write_bvh``).
     """
     check_motion_place(path, compact=compact)
     ending = Path(path).suffix.lower()
@@ -56,4 +66,4 @@ def write_motion(path: str | Path, motion: Motion, *, planted: Planted | None = 
     elif ending == ".glb":
         write_glb(path, motion, planted=planted, compact=compact)
     else:
-        write_bvh(path, motion)
+        write_bvh(path, motion, convention=convention)

@@ -1,0 +1,126 @@
+"""Options of commands that write motion: whose body, and for which program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    import numpy as np
+    from jaxtyping import Bool
+
+    from stridecast.formats.bvh_conventions import BvhConvention
+    from stridecast.model.motion import Motion
+    from stridecast.model.skeleton import Skeleton
+
+CharacterOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--skeleton", metavar="CHARACTER.bvh|.glb", help="Play it on this character's skeleton; else on the database's."
+    ),
+]
+BvhFor = Annotated[
+    str | None,
+    typer.Option("--bvh-for", metavar="blender|motionbuilder|unreal", help="Write BVH as this program expects it."),
+]
+BvhUnit = Annotated[
+    str | None, typer.Option("--bvh-unit", metavar="m|cm|mm|METRES", help="Unit of length; else the program's, or m.")
+]
+BvhOrder = Annotated[
+    str | None, typer.Option("--bvh-order", metavar="ZYX", help="Order of rotation channels; else ZYX.")
+]
+BvhUp = Annotated[str | None, typer.Option("--bvh-up", metavar="Y|Z", help="Axis that points up; else Y.")]
+BvhRoot = Annotated[
+    str | None,
+    typer.Option(
+        "--bvh-root", metavar="zero|standing|ground", help="OFFSET of the root, or a joint on the floor below it."
+    ),
+]
+BvhRest = Annotated[
+    bool | None, typer.Option("--bvh-rest/--no-bvh-rest", help="Begin with a frame in the rest pose, or not.")
+]
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+def bvh_written(
+    output: Path | None,
+    program: str | None,
+    unit: str | None,
+    order: str | None,
+    up: str | None,
+    root: str | None,
+    rest: bool | None,
+) -> BvhConvention:
+    """How BVH is to be written.
+
+    Raises
+    ------
+    InputError
+        Options that are none, or no BVH is written.
+    """
+    from stridecast.errors import InputError
+    from stridecast.formats.bvh_conventions import bvh_convention
+
+    given = {"for": program, "unit": unit, "order": order, "up": up, "root": root, "rest": rest}
+    named = [f"--bvh-{name}" for name, value in given.items() if value is not None]
+    if named and (output is None or output.suffix.lower() != ".bvh"):
+        raise InputError(f"{named[0]} goes with an output *.bvh")
+    return bvh_convention(
+        program or "plain",
+        order=order,
+        scale=None if unit is None else _metres(unit),
+        up=up,
+        root=root,
+        rest_frame=rest,
+    )
+
+
+def _metres(unit: str) -> float:
+    from stridecast.errors import InputError
+
+    if unit in UNITS:
+        return UNITS[unit]
+    try:
+        return float(unit)
+    except ValueError:
+        raise InputError(f"--bvh-unit must be {', '.join(UNITS)} or a number of metres, not {unit!r}") from None
+
+
+def open_character(path: Path | None, output: Path | None) -> Skeleton | None:
+    """Skeleton of the character who is to move, if one is named.
+
+    Raises
+    ------
+    InputError
+        No motion is written.
+    FileError, SkeletonError
+        As of ``load_skeleton``.
+    """
+    from stridecast.errors import FileError, InputError
+    from stridecast.formats.recordings import load_skeleton
+
+    if path is None:
+        return None
+    if output is None or output.suffix.lower() in (".csv", ".parquet"):
+        raise InputError("--skeleton goes with an output that has bodies, such as *.bvh")
+    if path.absolute() == output.absolute():
+        raise FileError("would be overwritten by the result; name another output", path=path)
+    return load_skeleton(path)
+
+
+def played(motion: Motion, character: Skeleton | None, planted: Bool[np.ndarray, "frames 2"]) -> Motion:
+    """The motion, on the character if there is one."""
+    from stridecast.body.recasting import recast
+
+    return motion if character is None else recast(motion, character, planted)
+
+
+def height_of(character: Skeleton, model: Skeleton) -> float:
+    """Height of a character that stands as the model does, metres."""
+    from stridecast.body.alignment import aligned, alignment
+    from stridecast.crowd.bodies import stature
+
+    return stature(aligned(character, alignment(character, model)))
