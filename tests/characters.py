@@ -62,6 +62,27 @@ def with_fingers(skeleton: Skeleton) -> Skeleton:
     return replace(skeleton, names=tuple(names), parents=np.array(parents), offsets=np.array(offsets))
 
 
+def with_twist_bones() -> Skeleton:
+    """The humanoid with a bone in the middle of each thigh and shin that no role knows."""
+    body = humanoid()
+    names, parents, offsets, roles = list(body.names), list(body.parents), list(body.offsets), dict(body.roles)
+    rows = []
+    for joint, name in enumerate(names):
+        limb = next((r for r, j in roles.items() if j == joint), "")
+        if limb.endswith(("_shin", "_foot")):
+            above = names[parents[joint]]
+            rows += [(f"{above}Twist", above, offsets[joint] / 2), (name, f"{above}Twist", offsets[joint] / 2)]
+        else:
+            rows.append((name, names[parents[joint]] if joint else "", offsets[joint]))
+    order = [name for name, _, _ in rows]
+    return Skeleton(
+        names=tuple(order),
+        parents=np.array([order.index(above) if above else -1 for _, above, _ in rows]),
+        offsets=np.array([offset for _, _, offset in rows]),
+        roles={role: order.index(names[joint]) for role, joint in roles.items()},
+    )
+
+
 def written(folder: Path, motion: Motion, scale: float = 0.01) -> Skeleton:
     """A skeleton as it comes back from a BVH file."""
     path = folder / "character.bvh"

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bodies import humanoid, standing, writhing
+from characters import with_twist_bones
 from stridecast.body import kinematics
 from stridecast.body.legs import STRAIGHTEST, reach
 from stridecast.geometry import quaternions as quat
@@ -151,27 +152,6 @@ def test_leg_folds_no_further_than_its_bones_allow(side):
 
 
 # bones between the joints that have roles
-
-
-def with_twist_bones() -> Skeleton:
-    """The humanoid with a bone in the middle of each thigh and shin that no role knows."""
-    body = humanoid()
-    names, parents, offsets, roles = list(body.names), list(body.parents), list(body.offsets), dict(body.roles)
-    rows = []
-    for joint, name in enumerate(names):
-        limb = next((r for r, j in roles.items() if j == joint), "")
-        if limb.endswith(("_shin", "_foot")):
-            above = names[parents[joint]]
-            rows += [(f"{above}Twist", above, offsets[joint] / 2), (name, f"{above}Twist", offsets[joint] / 2)]
-        else:
-            rows.append((name, names[parents[joint]] if joint else "", offsets[joint]))
-    order = [name for name, _, _ in rows]
-    return Skeleton(
-        names=tuple(order),
-        parents=np.array([order.index(above) if above else -1 for _, above, _ in rows]),
-        offsets=np.array([offset for _, _, offset in rows]),
-        roles={role: order.index(names[joint]) for role, joint in roles.items()},
-    )
 
 
 @given(SEEDS, SIDES)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bodies import humanoid, standing
-from characters import A_POSE, bandai_like, built, mixamo_like, posed_at_rest, still, written
+from characters import A_POSE, bandai_like, built, mixamo_like, posed_at_rest, still, with_twist_bones, written
 from rigs import along_x
 from stridecast.analysis.contacts import find_contacts
 from stridecast.body import kinematics
@@ -176,6 +176,13 @@ def test_the_same_body_in_another_rest_pose_makes_the_same_movement(walk, rest, 
     body = posed_at_rest(humanoid(), rest)
     body = written(tmp_path, along_x(still(body)) if axes else still(body))
     out = recast(walk.motion, body, walk.planted)
+    at, wanted = (kinematics.pose(m).positions[:, m.skeleton.chain(*ROLES)] for m in (out, walk.motion))
+    np.testing.assert_allclose(at, wanted, atol=3e-3)
+
+
+def test_bones_between_the_joints_that_we_know_ride_along(walk):
+    """Legs are as long as they are, whatever joints lie between: DAZ's bend and twist."""
+    out = recast(walk.motion, with_twist_bones(), walk.planted)
     at, wanted = (kinematics.pose(m).positions[:, m.skeleton.chain(*ROLES)] for m in (out, walk.motion))
     np.testing.assert_allclose(at, wanted, atol=3e-3)
 

@@ -34,7 +34,7 @@ FEET = (0.5, 2.0)
 """A foot that rolls lifts its ball higher or less as it is longer or shorter, within these limits ..."""
 
 ROLLING = 0.06
-"""... up to about here above the floor, metres; further up it is the leg that lifts it, by its length."""
+"""... up to about here above the floor, metres; further up it is the leg that lifts it, less if it is shorter."""
 
 BEARING = 0.3
 """Hips find the height that suits the steps over this time, seconds."""
@@ -152,7 +152,7 @@ def _feet(
     source = motion.skeleton
     here = feet_of(motion)
     toes = here.toes.copy()
-    lift, legs = toes[..., 1] - sole, _legs(body) / _legs(source)
+    lift, legs = toes[..., 1] - sole, np.minimum(_legs(body) / _legs(source), 1.0)
     rolls = np.exp(-np.maximum(lift, 0.0) / ROLLING)
     toes[..., 1] = sole_there + lift * (legs + (_foot_ratio(body, source) - legs) * rolls)
     wanted = toes.copy()
