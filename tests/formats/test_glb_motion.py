@@ -6,6 +6,7 @@ import json
 import struct
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,12 +17,14 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from bodies import humanoid, standing, writhing
-from glbs import Glb, packed
+from glbs import Glb, complaints, packed
 from stridecast.body import kinematics
-from stridecast.errors import FileError, StridecastError
+from stridecast.errors import FileError, SkeletonError, StridecastError
 from stridecast.formats.glb import GlbCrowd, body_glb, write_glb
 from stridecast.formats.glb_motion import read_glb
+from stridecast.formats.motion_files import write_motion
 from stridecast.formats.recordings import load_motion, load_skeleton
+from stridecast.model.motion import Motion
 from synthetic_gait import gait, ramps
 
 
@@ -55,11 +58,8 @@ def test_the_first_of_a_crowd_comes_back_at_its_own_size(tmp_path, walk):
     assert np.abs(kinematics.pose(back).positions - kinematics.pose(one).positions).max() < 1e-5
 
 
-@settings(max_examples=20)
-@given(seed=st.integers(0, 1000), unit=st.sampled_from([1.0, 0.01]), skinned=st.booleans())
-def test_joints_may_rest_at_any_angle_and_hang_from_anything(tmp_path_factory, walk, seed, unit, skinned):
+def animators_rig(path: Path, walk: Motion, seed: int, unit: float, skinned: bool) -> None:
     """The rig of an animator: turned joints, centimetres below a scaled node that is turned to z up."""
-    path = tmp_path_factory.mktemp("rig") / "a.glb"
     write_glb(path, walk)
     glb, rng = Glb(path.read_bytes()), np.random.default_rng(seed)
     skeleton = walk.skeleton
@@ -113,9 +113,59 @@ def test_joints_may_rest_at_any_angle_and_hang_from_anything(tmp_path_factory, w
     document |= {"bufferViews": views, "accessors": accessors, "buffers": [{"byteLength": len(numbers)}]}
     document["animations"] = [{"channels": channels, "samplers": samplers}]
     path.write_bytes(packed(document, numbers))
+
+
+RIGS = {"seed": st.integers(0, 1000), "unit": st.sampled_from([1.0, 0.01]), "skinned": st.booleans()}
+
+
+@settings(max_examples=20)
+@given(**RIGS)
+def test_joints_may_rest_at_any_angle_and_hang_from_anything(tmp_path_factory, walk, seed, unit, skinned):
+    path = tmp_path_factory.mktemp("rig") / "a.glb"
+    animators_rig(path, walk, seed, unit, skinned)
     back = load_motion(path)
     assert back.frame_rate == walk.frame_rate
     assert np.abs(kinematics.pose(back).positions - kinematics.pose(walk).positions).max() < 2e-4
+
+
+@settings(max_examples=20)
+@given(**RIGS)
+def test_any_rig_is_moved(tmp_path_factory, walk, seed, unit, skinned):
+    folder = tmp_path_factory.mktemp("rig")
+    animators_rig(folder / "a.glb", walk, seed, unit, skinned)
+    moved = writhing(load_skeleton(folder / "a.glb"), frames=20, seed=seed)
+    write_motion(folder / "b.glb", moved, character=folder / "a.glb")
+    glb = Glb((folder / "b.glb").read_bytes())
+    world = kinematics.pose(moved).positions
+    for frame in (0, 7, 19):
+        nodes = glb.world(0, frame / moved.frame_rate)
+        found = np.array([nodes[glb.names()[name], :3, 3] for name in moved.skeleton.names])
+        assert np.abs(found - world[frame]).max() < 2e-4
+
+
+def test_a_character_keeps_its_own_mesh(tmp_path, walk, khronos):
+    write_glb(tmp_path / "a.glb", walk)
+    rig = Glb((tmp_path / "a.glb").read_bytes())
+    moved = writhing(load_skeleton(tmp_path / "a.glb"), frames=20)
+    write_motion(tmp_path / "b.glb", moved, character=tmp_path / "a.glb")
+    glb = Glb((tmp_path / "b.glb").read_bytes())
+    assert complaints(khronos, tmp_path / "b.glb") == []
+    for part in ("meshes", "skins", "materials", "scenes"):
+        assert glb[part] == rig[part]
+    assert glb.numbers.startswith(rig.numbers)
+    assert len(glb["animations"]) == 1
+    back = load_motion(tmp_path / "b.glb")
+    assert np.abs(kinematics.pose(back).positions - kinematics.pose(moved).positions).max() < 1e-5
+    with pytest.raises(SkeletonError, match="another skeleton"):
+        write_motion(tmp_path / "c.glb", stretched(moved), character=tmp_path / "a.glb")
+    assert not (tmp_path / "c.glb").exists()
+
+
+def stretched(motion: Motion) -> Motion:
+    """Of a body with longer shins."""
+    offsets = motion.skeleton.offsets.copy()
+    offsets[motion.skeleton.chain("left_foot", "right_foot")] *= 1.3
+    return replace(motion, skeleton=replace(motion.skeleton, offsets=offsets))
 
 
 def figure(mode: str, times: np.ndarray, turns: np.ndarray, places: np.ndarray) -> bytes:

@@ -102,7 +102,7 @@ def mine(
         )
     if output is not None:
         motion = played(mined.motion, character, mined.planted)
-        write_motion(output, motion, planted=mined.planted, compact=compact, convention=convention)
+        write_motion(output, motion, planted=mined.planted, compact=compact, convention=convention, character=skeleton)
     if as_json:
         screen.print_json(_as_json(mined, output))
     elif not quiet:

@@ -150,7 +150,14 @@ def walk(
         if file is not None:  # takes its place only once the motion has been written too
             file.write(trace_text(journey).encode())
         if output is not None:
-            write_motion(output, journey.motion, planted=journey.planted, compact=compact, convention=convention)
+            write_motion(
+                output,
+                journey.motion,
+                planted=journey.planted,
+                compact=compact,
+                convention=convention,
+                character=skeleton,
+            )
     if sender is not None:
         with sender, screen.progress(quiet, {"play": "playing"}) as progress:
             _play(sender, journey.motion, progress)

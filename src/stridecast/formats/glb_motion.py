@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial.transform import Rotation
 
 from stridecast.body.rig import RawRecording
@@ -49,7 +49,7 @@ def read_glb(path: str | Path) -> RawRecording:
     """
     try:
         with Path(path).open("rb") as file:
-            return _Figure(GltfReader(path, file)).recording()
+            return GlbFigure(GltfReader(path, file)).recording()
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror or error}", path=path) from error
 
@@ -64,7 +64,7 @@ def read_glb_at_rest(path: str | Path) -> RawRecording:
     """
     try:
         with Path(path).open("rb") as file:
-            return _Figure(GltfReader(path, file), still=True).recording()
+            return GlbFigure(GltfReader(path, file), still=True).recording()
     except OSError as error:
         raise FileError(f"cannot be read: {error.strerror or error}", path=path) from error
 
@@ -75,7 +75,28 @@ class _Track(NamedTuple):
     mode: str
 
 
-class _Figure:
+class Rest(NamedTuple):
+    """Joints of a figure at rest, parents first.
+
+    Parameters
+    ----------
+    nodes, names, parents
+        Their nodes, their names, and their parents among them, -1 for the root.
+    turns, places
+        How they are turned in the world when the body is at rest, and where they are then, from the root.
+    local
+        How their nodes are turned.
+    """
+
+    nodes: tuple[int, ...]
+    names: tuple[str, ...]
+    parents: Int[Array, "joints"]
+    turns: Float[Array, "joints 4"]
+    places: Float[Array, "joints 3"]
+    local: Float[Array, "joints 4"]
+
+
+class GlbFigure:
     """What of a file is read: which nodes are joints, how they rest, and the animation that moves them."""
 
     def __init__(self, reader: GltfReader, *, still: bool = False) -> None:
@@ -138,6 +159,36 @@ class _Figure:
             unit=1.0,
             notes=tuple(self.notes),
         )
+
+    def at_rest(self) -> Rest:
+        """Its joints at rest."""
+        told = self.recording()
+        upright = quat.multiply(self.over(self.root)[1], self._rest(self.root))
+        turns = [self.binds.get(self.root, upright)]
+        places = np.zeros((len(self.joints), 3))
+        for k, node in enumerate(self.joints[1:], start=1):
+            parent = int(told.parents[k])
+            turns.append(self.binds.get(node, quat.multiply(turns[parent], self._rest(node))))
+            places[k] = places[parent] + told.offsets[k]
+        local = np.array([self._rest(node) for node in self.joints])
+        return Rest(tuple(self.joints), told.names, told.parents, np.array(turns), places, local)
+
+    def over(self, node: int) -> tuple[Float[Array, "3"], Float[Array, "4"], float]:
+        """The frame in which a node is placed, in the world with all nodes as they are: its place, turn and scale."""
+        place, turn, size = np.zeros(3), np.array(quat.IDENTITY), 1.0
+        for above in self._over(node)[::-1]:
+            place = place + size * quat.rotate(turn, self._place(above))
+            turn = quat.multiply(turn, self._rest(above))
+            size *= self._scale(above)
+        return place, turn, size
+
+    def unpack(self, node: int) -> None:
+        """Give a node that has a matrix its place, turn and scale instead, so that an animation can move it."""
+        if "matrix" in self.nodes[node]:
+            place, turn, size = self._of_matrix(node)
+            del self.nodes[node]["matrix"]
+            apart = {"translation": place.tolist(), "rotation": turn[[1, 2, 3, 0]].tolist(), "scale": [size] * 3}
+            self.nodes[node].update(apart)
 
     def _tracks(self) -> tuple[dict[tuple[int, str], _Track], Mapping[str, Any]]:
         """Keys by node and what they move, of the first animation."""

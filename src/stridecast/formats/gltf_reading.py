@@ -146,6 +146,11 @@ class GltfReader:
             self.wrong(f"{name} has a number that is not finite, at entry {int(np.argwhere(~np.isfinite(out))[0, 0])}")
         return out
 
+    def binary(self) -> bytes:
+        """All numbers that the file carries; large ones take as much memory."""
+        self._file.seek(self._start)
+        return self._file.read(self._size)
+
     def _open(self) -> dict[str, Any]:
         head = self._file.read(20)
         if len(head) < 4 or struct.unpack("<I", head[:4])[0] != MAGIC:

@@ -10,6 +10,7 @@ from stridecast.formats.bvh import write_bvh
 from stridecast.formats.bvh_conventions import BvhConvention
 from stridecast.formats.files import check_place
 from stridecast.formats.glb import Planted, check_compact, write_glb
+from stridecast.formats.glb_character import write_character
 from stridecast.formats.usd import ENDINGS as USD
 from stridecast.formats.usd import check_usd, write_usd
 from stridecast.model.motion import Motion
@@ -43,6 +44,7 @@ def write_motion(
     planted: Planted | None = None,
     compact: bool = False,
     convention: str | BvhConvention = "plain",
+    character: str | Path | None = None,
 ) -> None:
     """Write a motion as BVH, GLB or USD; errors are those of ``check_motion_place``.
 
@@ -58,11 +60,15 @@ def write_motion(
         A GLB with rotations of 16 bits (see ``write_glb``).
     convention
         How BVH is written (see ``write_bvh``).
+    character
+        The file that the motion's skeleton is from; where both are GLB, its meshes are kept (see ``write_character``).
     """
     check_motion_place(path, compact=compact)
     ending = Path(path).suffix.lower()
     if ending in USD:
         write_usd(path, motion, skin=mannequin)
+    elif ending == ".glb" and character is not None and Path(character).suffix.lower() == ".glb":
+        write_character(path, motion, character)
     elif ending == ".glb":
         write_glb(path, motion, planted=planted, compact=compact)
     else:
