@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import shutil
 import sys
@@ -51,15 +50,6 @@ def absent(what: str, reason: str) -> None:
     if what in os.environ.get("STRIDECAST_REQUIRE", "").replace(" ", "").split(","):
         pytest.fail(f"{reason}, and STRIDECAST_REQUIRE asks for {what}")
     pytest.skip(reason)
-
-
-@pytest.fixture(scope="session")
-def blender_python() -> str:
-    """A Python that has Blender's ``bpy``: ``STRIDECAST_BLENDER``, or this one. It must run in a process of its own."""
-    python = os.environ.get("STRIDECAST_BLENDER") or (sys.executable if importlib.util.find_spec("bpy") else "")
-    if not python:
-        absent("blender", "no bpy here (STRIDECAST_BLENDER names a Python that has it)")
-    return python
 
 
 @pytest.fixture(scope="session")

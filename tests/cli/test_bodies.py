@@ -11,9 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from characters import bandai_like, mixamo_like
+from glbs import Glb
 from stridecast.body import kinematics
 from stridecast.cli.main import app
 from stridecast.formats.bvh import read_bvh
+from stridecast.formats.glb import body_glb
 from stridecast.formats.recordings import load_motion, load_skeleton
 from stridecast.formats.store import save_database
 from stridecast.model.motion import Motion
@@ -163,3 +165,19 @@ def test_tables_have_no_bodies(database, tmp_path):
         said = refused("crowd", scene, "--database", database, "-o", tmp_path / "out.csv", *option)
         assert option[0] in said
     assert [path.name for path in tmp_path.iterdir()] == ["scene.yaml"]
+
+
+def test_a_rigged_character_comes_back_with_its_meshes(database, character, tmp_path):
+    rig = tmp_path / "rig.glb"
+    skeleton = load_skeleton(character, scale=0.01)
+    rig.write_bytes(body_glb(skeleton))
+    points = tmp_path / "points.csv"
+    points.write_text("time,x,z\n0,0,0\n1,0,1\n")
+    made = call("walk", database, "--input", points, "--skeleton", rig, "-o", tmp_path / "walk.glb", "--quiet")
+    assert made.exit_code == 0, made.output
+    before, after = (Glb(path.read_bytes()) for path in (rig, tmp_path / "walk.glb"))
+    assert after["meshes"] == before["meshes"]
+    assert after.numbers.startswith(before.numbers)
+    walked = load_motion(tmp_path / "walk.glb")
+    assert walked.skeleton.leg_length == pytest.approx(skeleton.leg_length, abs=1e-5)
+    assert np.hypot(*(middles(walked)[-1] - middles(walked)[0])) > 0.2

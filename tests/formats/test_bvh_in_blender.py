@@ -27,11 +27,11 @@ Blender = Callable[..., None]
 
 
 @pytest.fixture(scope="module")
-def blender(blender_python) -> Blender:
+def blender(blender: str) -> Blender:
     """Runs ``blender_rig.py`` with its arguments, in a process of its own."""
 
     def run(*arguments: object) -> None:
-        command = [blender_python, str(Path(__file__).with_name("blender_rig.py")), *map(str, arguments)]
+        command = [blender, str(Path(__file__).with_name("blender_rig.py")), *map(str, arguments)]
         clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
         done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300, env=clean)
         assert done.returncode == 0, done.stdout + done.stderr

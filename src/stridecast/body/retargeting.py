@@ -61,7 +61,7 @@ def retarget(motion: Motion, skeleton: Skeleton) -> Motion:
     turned = _world_rotations(skeleton, source, world.rotations)
     rotations = kinematics.local(skeleton, turned)
     hips = _hip_middle(source, world.positions) * scale
-    root = hips - _hip_middle_offset(skeleton, turned[:, 0])
+    root = hips - _hip_middle(skeleton, kinematics.forward(skeleton, np.zeros_like(hips), rotations).positions)
     for side in ("left", "right"):
         toe = world.positions[:, source.joint(f"{side}_toe")] * scale
         foot, toe_joint = skeleton.chain(f"{side}_foot", f"{side}_toe")
@@ -80,8 +80,10 @@ def _world_rotations(
         role = role_of.get(joint)
         if role is not None and role in source.roles:
             out[:, joint] = quat.multiply(source_rotations[:, source.roles[role]], _alignment(skeleton, source, role))
-        else:
+        elif joint > 0:
             out[:, joint] = out[:, skeleton.parents[joint]]
+        else:  # a root over the hips: they carry the whole movement
+            out[:, joint] = quat.IDENTITY
     return out
 
 
@@ -102,11 +104,3 @@ def _bone(skeleton: Skeleton, role: str, after: str) -> Float[np.ndarray, "3"]:
 def _hip_middle(skeleton: Skeleton, positions: Float[np.ndarray, "frames joints 3"]) -> Float[np.ndarray, "frames 3"]:
     """Middle between the hip joints: the same spot in any body, wherever a skeleton puts its root."""
     return positions[:, skeleton.chain("left_thigh", "right_thigh")].mean(axis=1)
-
-
-def _hip_middle_offset(
-    skeleton: Skeleton, root_rotations: Float[np.ndarray, "frames 4"]
-) -> Float[np.ndarray, "frames 3"]:
-    """From the root to the middle between the hip joints, in the world."""
-    middle = _hip_middle(skeleton, kinematics.rest(skeleton).positions[None])[0]
-    return quat.rotate(root_rotations, middle)
