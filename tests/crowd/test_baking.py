@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from stridecast.body import kinematics
+from stridecast.body.character import stature
 from stridecast.crowd.baking import LONGEST, Baking, overlap_depths
-from stridecast.crowd.bodies import stature
 from stridecast.crowd.crowd import Crowd
 from stridecast.crowd.frame import CrowdFrame
 from stridecast.errors import InputError

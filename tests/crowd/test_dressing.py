@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from stridecast.analysis.take import analyse
 from stridecast.body import kinematics
+from stridecast.body.character import stature
 from stridecast.crowd.baking import Baking
-from stridecast.crowd.bodies import stature
 from stridecast.crowd.crowd import Crowd
 from stridecast.crowd.dressing import dress, dress_each, rests_of
 from stridecast.errors import InputError

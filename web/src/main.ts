@@ -165,10 +165,16 @@ function dress(page: Page, welcome: NonNullable<Page["welcome"]>): void {
   const people = new People(bodyOf(welcome.skeleton));
   page.people = people;
   page.stage.scene.add(people.group);
-  Skin.load(`body.glb?session=${encodeURIComponent(welcome.session)}`, people.body, MOST_SKINNED)
+  const session = encodeURIComponent(welcome.session);
+  const { character } = welcome;
+  const skin = character
+    ? Skin.wear(`character.glb?session=${session}`, people.body, MOST_SKINNED, character)
+    : Skin.load(`body.glb?session=${session}`, people.body, MOST_SKINNED);
+  const whose = character ? "meshes of the character" : "mannequin";
+  skin
     .then((skin) => people.wear(skin))
     .catch((error: unknown) =>
-      page.messages.say(`The mannequin could not be loaded (${String(error)}); simpler figures are shown.`),
+      page.messages.say(`The ${whose} could not be loaded (${String(error)}); simpler figures are shown.`),
     );
 }
 

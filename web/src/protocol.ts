@@ -474,6 +474,24 @@ export interface Built {
   motions: string[];
 }
 
+/**
+ * The file of the character in whose body everybody is (``GET /character.glb``), and how to pose it.
+ *
+ * With its rotation ``q`` in a frame, joint ``j`` turns node ``nodes[j]`` of the file (-1: it has none) to
+ * ``before[j] q after[j]``, all ``w x y z``. With its place ``p`` there, the root's node has the translation
+ * ``turn^-1 (p / size - corner) / grown``, and the whole scene of the file the scale ``size``; for a person of another
+ * size multiply ``size`` by theirs. Other nodes stay as they are.
+ */
+export interface CharacterPart {
+  nodes: number[];
+  before: [number, number, number, number][];
+  after: [number, number, number, number][];
+  corner: [number, number, number];
+  turn: [number, number, number, number];
+  grown: number;
+  size: number;
+}
+
 /** Answer to ``clip`` and ``mine``: figure 1 is shown as played, and figure 2 as recorded if ``beside``. */
 export interface ClipReady {
   type: "clip_ready";
@@ -684,7 +702,7 @@ export interface Pong {
 /** How far something long is: ``read``, ``analyse``, ``assemble`` of a build, ``compile``, ``ways``, ``export``. */
 export interface Progress {
   type: "progress";
-  stage: "read" | "analyse" | "assemble" | "compile" | "ways" | "export";
+  stage: "read" | "analyse" | "assemble" | "compile" | "ways" | "cast" | "export";
   done: number;
   total: number;
 }
@@ -780,6 +798,7 @@ export interface Welcome {
   session: string;
   database: DatabasePart;
   skeleton: SkeletonPart;
+  character: CharacterPart | null;
   settings: SettingsState;
   rules: string[];
   bounds: string[];

@@ -84,28 +84,27 @@ def recast(motion: Motion, skeleton: Skeleton, planted: Bool[Array, "frames 2"])
         return replace(motion, skeleton=skeleton)
     body = aligned(skeleton, turns)
     world = kinematics.pose(motion)
-    sole, sole_there = _soles(body, motion, world, planted)
-    posed = _posed(body, motion, world, sole, sole_there)
-    feet = _feet(body, motion, world, planted, sole, sole_there)
+    heights = world.positions[:, motion.skeleton.chain("left_toe", "right_toe"), 1]
+    sole = np.array([np.percentile(heights[planted[:, k] if planted[:, k].any() else ..., k], SOLE) for k in range(2)])
+    sole_there = soles(body, motion.skeleton, sole)
+    posed = turned_alike(body, motion, world, sole, sole_there)
+    free, shift = feet_alike(body, motion, world, sole, sole_there)
+    feet = _standing(free, shift, planted, motion.frame_rate)
     posed = _borne(posed, feet, motion, planted)
     planted = planted & _bearable(posed, feet)
     moved = put_feet(posed, feet, planted, reach_of(motion, planted))
     return unaligned(with_toes_up(moved), skeleton, turns)
 
 
-def _soles(
-    body: Skeleton, motion: Motion, world: World, planted: Bool[Array, "frames 2"]
-) -> tuple[Float[Array, "2"], Float[Array, "2"]]:
-    """Heights of the toe joints over the floor when feet are flat, of the motion and of the other body, metres."""
-    heights = world.positions[:, motion.skeleton.chain("left_toe", "right_toe"), 1]
-    here = np.array([np.percentile(heights[planted[:, k] if planted[:, k].any() else ..., k], SOLE) for k in range(2)])
+def soles(body: Skeleton, source: Skeleton, sole: Float[Array, "2"]) -> Float[Array, "2"]:
+    """Heights of the toe joints over the floor when feet are flat, where those of the source's are ``sole``, metres."""
     rest = kinematics.rest(body)
     ends = kinematics.ends(body, rest)
     below = []
     for toe in body.chain("left_toe", "right_toe"):
         lowest = ends[body.end_joints == toe, 1].min(initial=rest.positions[toe, 1])
         below.append(rest.positions[toe, 1] - lowest)
-    return here, np.maximum(here * _foot_ratio(body, motion.skeleton), below)
+    return np.maximum(sole * _foot_ratio(body, source), below)
 
 
 def _foot_ratio(body: Skeleton, source: Skeleton) -> Float[Array, "2"]:
@@ -121,7 +120,9 @@ def _legs(skeleton: Skeleton) -> Float[Array, "2"]:
     return np.asarray(np.linalg.norm(np.diff(at[legs], axis=1), axis=-1).sum(axis=1))
 
 
-def _posed(body: Skeleton, motion: Motion, world: World, sole: Array, sole_there: Array) -> Motion:
+def turned_alike(
+    body: Skeleton, motion: Motion, world: World, sole: Float[Array, "2"], sole_there: Float[Array, "2"]
+) -> Motion:
     """The body with its joints turned as in the motion, hips over the same ground, at their own height."""
     source = motion.skeleton
     turned = np.empty((motion.frames, body.joints, 4))
@@ -145,17 +146,20 @@ def _posed(body: Skeleton, motion: Motion, world: World, sole: Array, sole_there
     )
 
 
-def _feet(
-    body: Skeleton, motion: Motion, world: World, planted: Bool[Array, "frames 2"], sole: Array, sole_there: Array
-) -> Feet:
-    """Where feet are to be: over the same ground, but for wider hips further apart, and longer ones further ahead."""
+def feet_alike(
+    body: Skeleton, motion: Motion, world: World, sole: Float[Array, "2"], sole_there: Float[Array, "2"]
+) -> tuple[Feet, Float[Array, "frames 2 2"]]:
+    """Where feet would be over the same ground, and how far over it that is from the motion's own.
+
+    They are further apart where hips are wider, and further ahead where feet are longer.
+    """
     source = motion.skeleton
     here = feet_of(motion)
     toes = here.toes.copy()
     lift, legs = toes[..., 1] - sole, np.minimum(_legs(body) / _legs(source), 1.0)
     rolls = np.exp(-np.maximum(lift, 0.0) / ROLLING)
     toes[..., 1] = sole_there + lift * (legs + (_foot_ratio(body, source) - legs) * rolls)
-    wanted = toes.copy()
+    shift = np.empty((motion.frames, 2, 2))
     rest, like = kinematics.rest(body).positions, kinematics.rest(source).positions
     facing = quat.twist_about_y(world.rotations[:, 0])
     for side, name in enumerate(SIDES):
@@ -167,30 +171,47 @@ def _feet(
         aside = np.array([wide[0] - wide[1], 0.0])
         ahead = np.array([0.0, 0.5 * (long[0] - long[1])])
         flat = quat.multiply(here.turns[:, side], quat.inverse(flattening(source, name)))
-        shift = ground.turn(aside, facing) + ground.turn(ahead, quat.twist_about_y(flat))
-        toes[:, side, ::2] += shift
+        shift[:, side] = ground.turn(aside, facing) + ground.turn(ahead, quat.twist_about_y(flat))
+    toes[..., ::2] += shift
+    return Feet(toes=toes, turns=here.turns), shift
+
+
+def _standing(free: Feet, shift: Float[Array, "frames 2 2"], planted: Bool[Array, "frames 2"], rate: float) -> Feet:
+    """The feet over one place in each stance."""
+    wanted = free.toes.copy()
+    for side in range(2):
         for stands, start, stop in signals.runs(planted[:, side]):
             if stands:
-                wanted[start:stop, side, ::2] += shift[start:stop].mean(axis=0)
-    free = Feet(toes=toes, turns=here.turns)
-    return corrected(free, Feet(toes=wanted, turns=here.turns), planted, motion.frame_rate)
+                own = shift[start:stop, side]
+                wanted[start:stop, side, ::2] += own.mean(axis=0) - own
+    return corrected(free, Feet(toes=wanted, turns=free.turns), planted, rate)
 
 
 def _borne(posed: Motion, feet: Feet, motion: Motion, planted: Bool[Array, "frames 2"]) -> Motion:
     """Hips at a height, slowly changing, at which planted legs are stretched as they are in the motion."""
     if not planted.any():
         return posed
-    rise, count = np.zeros(posed.frames), planted.sum(axis=1)
+    rise = rises(posed, feet, motion, planted)
+    known = np.flatnonzero(planted.any(axis=1))
+    rise = np.interp(np.arange(posed.frames), known, rise[known])
+    return risen(posed, gaussian_filter1d(rise, BEARING * posed.frame_rate, mode="nearest"))
+
+
+def rises(posed: Motion, feet: Feet, motion: Motion, planted: Bool[Array, "frames 2"]) -> Float[Array, "frames"]:
+    """How much higher hips would be if planted legs were stretched as they are in the motion; 0 where none stands."""
+    rise = np.zeros(posed.frames)
     lengths, source_lengths = _legs(posed.skeleton), _legs(motion.skeleton)
     for side in range(2):
         stretched = np.linalg.norm(_from_ankle(motion, feet_of(motion), side), axis=-1) / source_lengths[side]
         away, length = _from_ankle(posed, feet, side), lengths[side]
         height = np.sqrt(np.maximum((stretched * length) ** 2 - np.sum(away[:, ::2] ** 2, axis=-1), 0.0))
         rise += np.where(planted[:, side], np.clip(height - away[:, 1], -DEEPEST * length, HIGHEST * length), 0.0)
-    known = np.flatnonzero(count)
-    rise = np.interp(np.arange(posed.frames), known, rise[known] / count[known])
-    rise = gaussian_filter1d(rise, BEARING * posed.frame_rate, mode="nearest")
-    return replace(posed, root_positions=posed.root_positions + rise[:, None] * [0.0, 1.0, 0.0])
+    return rise / np.maximum(planted.sum(axis=1), 1)
+
+
+def risen(motion: Motion, rise: Float[Array, "frames"]) -> Motion:
+    """The same motion, so much higher."""
+    return replace(motion, root_positions=motion.root_positions + rise[:, None] * [0.0, 1.0, 0.0])
 
 
 def _from_ankle(motion: Motion, feet: Feet, side: int) -> Float[Array, "frames 3"]:

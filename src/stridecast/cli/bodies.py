@@ -121,6 +121,6 @@ def played(motion: Motion, character: Skeleton | None, planted: Bool[np.ndarray,
 def height_of(character: Skeleton, model: Skeleton) -> float:
     """Height of a character that stands as the model does, metres."""
     from stridecast.body.alignment import aligned, alignment
-    from stridecast.crowd.bodies import stature
+    from stridecast.body.character import stature
 
     return stature(aligned(character, alignment(character, model)))

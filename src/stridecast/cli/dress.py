@@ -79,8 +79,8 @@ def dress(
 
     Noise, sway and what no person can do are taken out; the report tells how far that leads away from the source.
     """
+    from stridecast.body.character import stature
     from stridecast.cli import screen
-    from stridecast.crowd.bodies import stature
     from stridecast.crowd.dressing import dress_each, summed
     from stridecast.errors import FileError, InputError
     from stridecast.formats.crowd_files import CrowdFiles

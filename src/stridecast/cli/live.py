@@ -38,6 +38,15 @@ Vmc = Annotated[
         show_default=False,
     ),
 ]
+Skeleton = Annotated[
+    Path | None,
+    typer.Option(
+        "--skeleton",
+        metavar="CHARACTER.glb|.bvh",
+        help="Everybody is this character, with its proportions and, from a rigged GLB, its meshes.",
+        show_default=False,
+    ),
+]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but the address.")]
 
@@ -48,11 +57,12 @@ def live(
     host: Host = None,
     port: Port = None,
     vmc: Vmc = None,
+    skeleton: Skeleton = None,
     browser: Browser = True,
     quiet: Quiet = False,
 ) -> None:
     """Open the page: steer a walker by hand, draw scenes and watch crowds in them, look through the database."""
-    _serve(database, scene, host, port, vmc, browser, quiet)
+    _serve(database, scene, host, port, vmc, skeleton, browser, quiet)
 
 
 def demo(
@@ -60,11 +70,12 @@ def demo(
     host: Host = None,
     port: Port = None,
     vmc: Vmc = None,
+    skeleton: Skeleton = None,
     browser: Browser = True,
     quiet: Quiet = False,
 ) -> None:
     """Open the page with the sample database, which needs no recordings."""
-    _serve(None, scene, host, port, vmc, browser, quiet)
+    _serve(None, scene, host, port, vmc, skeleton, browser, quiet)
 
 
 def _serve(
@@ -73,18 +84,26 @@ def _serve(
     host: str | None,
     port: int | None,
     vmc: str | None,
+    skeleton: Path | None,
     browser: bool,
     quiet: bool,
 ) -> None:
     from stridecast.cli import screen
     from stridecast.formats.vmc import parsed_address
+    from stridecast.formats.recordings import load_skeleton
+    from stridecast.live.cast import cast
     from stridecast.live.serve import LiveServer
 
     receiver = None if vmc is None else parsed_address(vmc)
     place = None if scene is None else _scene(scene)
+    character = None if skeleton is None else load_skeleton(skeleton)
     learned = open_database(database, quiet=quiet)
+    costume = None
+    if skeleton is not None and character is not None:
+        with screen.progress(quiet, {"cast": "playing all segments by the character"}) as progress:
+            learned, costume = cast(learned, skeleton, character, lambda done, total: progress("cast", done, total))
     name = "sample database" if database is None else database.stem
-    server = LiveServer(learned, name, scene=place, host=host, port=port, receiver=receiver)
+    server = LiveServer(learned, name, costume=costume, scene=place, host=host, port=port, receiver=receiver)
     with screen.progress(quiet, {}):
         try:
             server.run(ready=lambda: _tell(server, browser=browser, quiet=quiet))

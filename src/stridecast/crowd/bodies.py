@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from stridecast.body import kinematics
+from stridecast.body.character import resized, stature
 from stridecast.model.database import MotionDatabase
 from stridecast.model.pose import VehicleState
 from stridecast.model.segment import MOTIONS, RUN, STAND, WALK
@@ -59,7 +57,7 @@ class Bodies:
 
     def __init__(self, database: MotionDatabase, frame_rate: float, *, threads: int = 1) -> None:
         self.database, self.frame_rate, self.threads = database, frame_rate, threads
-        self.height = stature(database.skeleton)
+        self.height = person_height(database)
         self.roots = np.zeros((0, 3))
         self.rotations = np.zeros((0, database.skeleton.joints, 4))
         self.planted = np.zeros((0, 2), np.bool_)
@@ -162,17 +160,11 @@ class Bodies:
         self.scales[more - POOL :] = 1.0
 
 
-def stature(skeleton: Skeleton) -> float:
-    """Height of a skeleton that stands in its rest pose, metres."""
-    rest = kinematics.rest(skeleton).positions
-    ends = rest[skeleton.end_joints] + skeleton.end_offsets
-    heights = np.concatenate((rest[:, 1], ends[:, 1])) if len(skeleton.end_joints) else rest[:, 1]
-    return float(heights.max() - heights.min())
+def person_height(database: MotionDatabase) -> float:
+    """Height of a person who is as large as the skeleton of a database, metres."""
+    return stature(database.skeleton) if database.person is None else database.person
 
 
-def scaled_to(skeleton: Skeleton, height: float | None) -> Skeleton:
-    """A skeleton of another height, metres; as it is where nothing is said."""
-    if height is None:
-        return skeleton
-    scale = height / stature(skeleton)
-    return replace(skeleton, offsets=scale * skeleton.offsets, end_offsets=scale * skeleton.end_offsets)
+def body_of(database: MotionDatabase, height: float | None) -> Skeleton:
+    """The skeleton of a person of some height, metres; that of the database where nothing is said."""
+    return database.skeleton if height is None else resized(database.skeleton, height / person_height(database))

@@ -10,7 +10,8 @@ from itertools import islice
 import numpy as np
 from jaxtyping import Bool, Int
 
-from stridecast.crowd.bodies import LEVELS, Bodies, motions_of, scaled_to, stature
+from stridecast.body.character import stature
+from stridecast.crowd.bodies import LEVELS, Bodies, body_of, motions_of
 from stridecast.crowd.bounds import HumanBounds
 from stridecast.crowd.explanation import Explanation, Outlook, explanation_of
 from stridecast.crowd.frame import CrowdFrame
@@ -299,12 +300,11 @@ class Crowd:
 
     def skeleton(self, number: int) -> Skeleton:
         """The skeleton of somebody, of their height."""
-        return scaled_to(self.database.skeleton, self.person(number).height)
+        return body_of(self.database, self.person(number).height)
 
     def height(self, number: int) -> float:
         """Of somebody's body, metres."""
-        own = self.person(number).height
-        return stature(self.database.skeleton) if own is None else own
+        return stature(self.skeleton(number))
 
     def _settled(self, rows: Int[Array, "rows"]) -> Bool[Array, "rows"]:
         m, p = self._traffic.moving, self._traffic.people

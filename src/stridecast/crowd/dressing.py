@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from stridecast.crowd.baking import filmed
-from stridecast.crowd.bodies import Bodies, motions_of, scaled_to
+from stridecast.crowd.bodies import Bodies, body_of, motions_of
 from stridecast.crowd.bounds import HumanBounds
 from stridecast.crowd.human import BOUNDS, HumanTrack, TrackReport, make_human, stretches
 from stridecast.errors import InputError
@@ -294,7 +294,7 @@ def _motions(
         roots[rows, k], rotations[rows, k] = bodies.roots[rows], bodies.rotations[rows]
         planted[rows, k] = bodies.planted[rows]
     for k, (track, end) in enumerate(zip(tracks, lengths.tolist(), strict=True)):
-        skeleton = scaled_to(database.skeleton, heights.get(track.person))
+        skeleton = body_of(database, heights.get(track.person))
         yield filmed(roots[k, :end], rotations[k, :end], skeleton, rate, str(track.person)), planted[k, :end]
 
 

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 from stridecast.analysis.cycles import find_cycle
 from stridecast.analysis.style import joint_spread, score, stoop
 from stridecast.analysis.take import TakeAnalysis
-from stridecast.geometry import quaternions as quat
+from stridecast.database.poses import poses_of
 from stridecast.model.annotation import Annotations, TakeAnnotation
 from stridecast.model.database import INTERVALS, MARGIN, Examples, Take
 from stridecast.model.group import MotionGroup
@@ -151,14 +151,10 @@ def _posture(
     skeleton: Skeleton, references: Float[Array, "bones 4"], features: Float[Array, "examples rows features"]
 ) -> tuple[Float[Array, "examples"], Float[Array, "examples"]]:
     """Spread and stoop of each example."""
-    tilt = 3 * len(references)
-    joints = features[..., :tilt].reshape(*features.shape[:2], -1, 3)
     spread, bent = np.empty(len(features)), np.empty(len(features))
     for start in range(0, len(features), 256):  # not all at once: a large database would not fit
         some = slice(start, start + 256)
-        rotations = quat.multiply(references, quat.exp(joints[some]))
-        root = quat.multiply(quat.about_y(features[some, :, -1]), quat.exp(features[some, :, tilt : tilt + 3]))
-        whole = np.concatenate((root[:, :, None], rotations), axis=2)
+        whole, _ = poses_of(references, features[some])
         spread[some] = joint_spread(skeleton, whole)
         bent[some] = stoop(skeleton, whole[:, ::EVERY], np.zeros(whole[:, ::EVERY].shape[:2]))
     return spread, bent

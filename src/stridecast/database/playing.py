@@ -10,9 +10,9 @@ from jaxtyping import Bool, Float, Int
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
 
-from stridecast.analysis.take import SOLE
 from stridecast.body.planting import corrected, feet_of, put_feet, raised, standing, with_toes_up
 from stridecast.database.clips import FIRST, LAST, Clips, toe_off
+from stridecast.database.poses import sole_height, tangents_of
 from stridecast.geometry import ground
 from stridecast.geometry import quaternions as quat
 from stridecast.model.database import INTERVALS, MotionDatabase
@@ -42,6 +42,8 @@ class Performance:
     ----------
     skeleton, references
         As in ``MotionDatabase``.
+    sole
+        Height of the toe joints of flat feet, metres.
     seconds
         Length of the cycle or of the clip.
     repeats
@@ -58,6 +60,7 @@ class Performance:
 
     skeleton: Skeleton
     references: Float[Array, "bones 4"]
+    sole: float
     seconds: float
     repeats: bool
     features: CubicSpline
@@ -154,6 +157,7 @@ def perform(
     free = Performance(
         skeleton=database.skeleton,
         references=database.references,
+        sole=sole_height(database),
         seconds=length,
         repeats=clips.repeats,
         features=spline,
@@ -182,6 +186,7 @@ def recorded(database: MotionDatabase, rows: Sequence[int]) -> Performance:
     return Performance(
         skeleton=database.skeleton,
         references=database.references,
+        sole=sole_height(database),
         seconds=float(begins[-1]),
         repeats=False,
         features=CubicSpline(knots, table),
@@ -300,14 +305,14 @@ def _with_planted_feet(free: Performance) -> Performance:
     rounds = 3 if free.repeats else 1  # of a cycle, the middle one: all that plants its feet is periodic there
     times = (np.arange(rounds * frames + 1) - rounds // 2 * frames) * step
     motion, planted = free.motion(times, 1 / step, "", ""), free.planted(times)
-    own, sole = feet_of(motion), SOLE * free.skeleton.leg_length
+    own, sole = feet_of(motion), free.sole
     feet = raised(corrected(own, raised(standing(own, planted), sole), planted, 1 / step), sole)
     # Of a cycle the vehicle goes evenly, the recorded one did not: the pelvis follows what is done to both feet.
     lag = gaussian_filter1d((feet.toes - own.toes).mean(axis=1), LAG / step, axis=0, mode="nearest")
     motion = with_toes_up(put_feet(replace(motion, root_positions=motion.root_positions + lag), feet, planted))
     positions, headings = free.vehicle(times)
     away = quat.rotate(quat.about_y(-headings), motion.root_positions - ground.lift(positions))
-    joints = quat.log(quat.multiply(quat.inverse(free.references), motion.rotations[:, 1:])).reshape(len(times), -1)
+    joints = tangents_of(free.references, motion.rotations)
     table = free.values(times)
     table[:, : joints.shape[1]], table[:, -4:-1] = joints, away
     if free.repeats:

@@ -61,6 +61,8 @@ def save_database(database: MotionDatabase, path: str | Path) -> None:
         "frame_rate": database.frame_rate,
         "bounds_method": database.bounds_method,
         "skeleton": body,
+        "sole": database.sole,
+        "person": database.person,
         "groups": [asdict(group) for group in database.groups],
         "takes": [asdict(take) for take in database.takes],
     }
@@ -119,6 +121,8 @@ def _unpack(header: Mapping[str, Any], tensors: Tensors) -> MotionDatabase:
         takes=takes,
         annotations=annotations,
         bounds_method=str(header["bounds_method"]),
+        sole=header.get("sole"),
+        person=header.get("person"),
     )
 
 

@@ -82,6 +82,12 @@ def make_app(hall: Hall, rules: Rules) -> Starlette:
         body = await run_in_threadpool(body_glb, guest.skeleton)
         return Response(body, media_type="model/gltf-binary", headers={"cache-control": "no-store"})
 
+    async def give_character(request: Request) -> Response:
+        guest = hall.guests.get(request.query_params.get("session", ""))
+        if guest is None or guest.character is None or not guest.character.is_file():
+            return JSONResponse({"error": "there is no such session, or it has no character of its own"}, 404)
+        return FileResponse(guest.character, media_type="model/gltf-binary", headers={"cache-control": "no-store"})
+
     async def give_file(request: Request) -> Response:
         found = hall.find(request.path_params["word"])
         if found is None or not found.path.is_file():
@@ -98,6 +104,7 @@ def make_app(hall: Hall, rules: Rules) -> Starlette:
             Route("/", page),
             WebSocketRoute("/ws", connect),
             Route("/body.glb", give_body),
+            Route("/character.glb", give_character),
             Route("/files", take_file, methods=["POST"]),
             Route("/download/{word}", give_file),
             Mount("/assets", StaticFiles(directory=hall.bundle / "assets", check_dir=False)),

@@ -14,9 +14,10 @@ from stridecast.crowd.crowd import Crowd
 from stridecast.errors import InputError
 from stridecast.formats.crowd_files import CrowdFiles
 from stridecast.formats.files import replacing
-from stridecast.formats.glb import GlbCrowd
+from stridecast.formats.glb import GlbCrowd, Planted
 from stridecast.formats.motion_files import write_motion
 from stridecast.formats.trace import trace_text
+from stridecast.live.cast import Costume, worn
 from stridecast.live.frames import Figures, unpack_rotations
 from stridecast.model.motion import Motion
 from stridecast.synthesis.journey import Journey
@@ -30,13 +31,24 @@ SHORTEST = 2
 """Frames that make a motion."""
 
 
-def write_walk(path: Path, journey: Journey, what: str) -> None:
+def write_walk(path: Path, journey: Journey, what: str, costume: Costume | None) -> None:
     """A walk as ``bvh`` or ``glb``, or as ``csv`` its trace."""
     if what != "csv":
-        write_motion(path, journey.motion, planted=journey.planted)
+        _write(path, journey.motion, costume, journey.planted)
         return
     with replacing(path) as file:
         file.write(trace_text(journey).encode())
+
+
+def write_clip(path: Path, motion: Motion, costume: Costume | None) -> None:
+    """A clip as BVH or GLB."""
+    _write(path, motion, costume, None)
+
+
+def _write(path: Path, motion: Motion, costume: Costume | None, planted: Planted | None) -> None:
+    """A motion, on the character if there is one."""
+    character = None if costume is None else costume.file
+    write_motion(path, worn(costume, motion), planted=planted, character=character)
 
 
 def write_ways(path: Path, frames: Frames) -> None:
@@ -52,7 +64,13 @@ def write_ways(path: Path, frames: Frames) -> None:
         _add_rows(files, frames)
 
 
-def write_motions(path: Path, frames: Frames, crowd: Crowd, progress: Callable[[int, int], None] | None = None) -> None:
+def write_motions(
+    path: Path,
+    frames: Frames,
+    crowd: Crowd,
+    costume: Costume | None,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
     """A zip of a BVH a person, their index, and everybody's places (see ``crowd_files``).
 
     Raises
@@ -66,7 +84,7 @@ def write_motions(path: Path, frames: Frames, crowd: Crowd, progress: Callable[[
             _add_rows(files, frames)
             motions = _motions(frames, crowd)
             for done, (number, (start, motion)) in enumerate(motions.items()):
-                files.add_motion(number, motion.name, start, motion, crowd.height(number))
+                files.add_motion(number, motion.name, start, worn(costume, motion), crowd.height(number))
                 if progress is not None:
                     progress(done, len(motions))
         with zipfile.ZipFile(path, "x", zipfile.ZIP_DEFLATED, compresslevel=3) as archive:
@@ -74,7 +92,13 @@ def write_motions(path: Path, frames: Frames, crowd: Crowd, progress: Callable[[
                 archive.write(written, written.name)
 
 
-def write_figures(path: Path, frames: Frames, crowd: Crowd, progress: Callable[[int, int], None] | None = None) -> None:
+def write_figures(
+    path: Path,
+    frames: Frames,
+    crowd: Crowd,
+    costume: Costume | None,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
     """Everybody in motion as one GLB (see ``GlbCrowd``).
 
     Raises
@@ -87,7 +111,7 @@ def write_figures(path: Path, frames: Frames, crowd: Crowd, progress: Callable[[
     try:
         motions = _motions(frames, crowd)
         for done, (start, motion) in enumerate(motions.values()):
-            scene.add(motion, name=motion.name, start=start)
+            scene.add(worn(costume, motion), name=motion.name, start=start)
             if progress is not None:
                 progress(done, len(motions))
         scene.save()

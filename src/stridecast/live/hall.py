@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from stridecast.live.cast import Costume
 from stridecast.live.downloads import Download, Downloads
 from stridecast.live.messages import LimitsPart
 from stridecast.live.uploads import Uploads
@@ -31,13 +32,15 @@ BUNDLE = Path(__file__).parent / "static"
 
 @dataclass(eq=False)
 class Guest:
-    """What a session keeps in files, the skeleton of those whom it shows, and its number among those who are there."""
+    """What a session keeps in files, the skeleton of those whom it shows and its character's file, and its number among
+    those who are there."""
 
     folder: Path
     uploads: Uploads
     downloads: Downloads
     skeleton: Skeleton
     seat: int
+    character: Path | None = None
 
 
 @dataclass(kw_only=True, eq=False)
@@ -48,6 +51,8 @@ class Hall:
     ----------
     database, name
         What walkers have learned, and how it is called.
+    costume
+        In whose body they walk, where it is that of a file; ``database`` is cast for it.
     scene
         The scene that sessions begin with, as its file says it.
     limits
@@ -65,6 +70,7 @@ class Hall:
 
     database: MotionDatabase
     name: str = "sample database"
+    costume: Costume | None = None
     scene: Mapping[str, Any] = field(default_factory=lambda: EMPTY)
     limits: LimitsPart
     most_sessions: int = MOST_SESSIONS

@@ -44,6 +44,7 @@ class Part(BaseModel):
 Coordinate = Annotated[float, Field(ge=-FARTHEST, le=FARTHEST)]
 Point = tuple[Coordinate, Coordinate]
 Vector3 = tuple[float, float, float]
+Turn = tuple[float, float, float, float]
 Stamp = Annotated[float, Field(ge=-1e15, le=1e15)]
 Request = Annotated[int, Field(ge=0, lt=2**31)]
 Name = Annotated[str, Field(min_length=1, max_length=200)]
@@ -349,6 +350,24 @@ class SkeletonPart(Part):
     height: float
 
 
+class CharacterPart(Part):
+    """The file of the character in whose body everybody is (``GET /character.glb``), and how to pose it.
+
+    With its rotation ``q`` in a frame, joint ``j`` turns node ``nodes[j]`` of the file (-1: it has none) to
+    ``before[j] q after[j]``, all ``w x y z``. With its place ``p`` there, the root's node has the translation
+    ``turn^-1 (p / size - corner) / grown``, and the whole scene of the file the scale ``size``; for a person of another
+    size multiply ``size`` by theirs. Other nodes stay as they are.
+    """
+
+    nodes: list[int]
+    before: list[Turn]
+    after: list[Turn]
+    corner: Vector3
+    turn: Turn
+    grown: float
+    size: float
+
+
 class DatabasePart(Part):
     """What is known of the database in use. ``graph``: pairs of groups of which the second can follow the first."""
 
@@ -399,6 +418,7 @@ class Welcome(Part):
     session: str
     database: DatabasePart
     skeleton: SkeletonPart
+    character: CharacterPart | None
     settings: SettingsState
     rules: list[str]
     bounds: list[str]
@@ -623,7 +643,7 @@ class Progress(Part):
     """How far something long is: ``read``, ``analyse``, ``assemble`` of a build, ``compile``, ``ways``, ``export``."""
 
     type: Literal["progress"] = "progress"
-    stage: Literal["read", "analyse", "assemble", "compile", "ways", "export"]
+    stage: Literal["read", "analyse", "assemble", "compile", "ways", "cast", "export"]
     done: int
     total: int
 

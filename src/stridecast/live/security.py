@@ -121,7 +121,7 @@ def content_policy(host: str) -> str:
     """What the page may load: its own files and its own websocket."""
     return (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; font-src 'self'; "
-        f"connect-src 'self' ws://{host}; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; "
+        f"connect-src 'self' blob: ws://{host}; worker-src 'self' blob:; base-uri 'none'; form-action 'none'; "
         "frame-ancestors 'none'"
     )
 

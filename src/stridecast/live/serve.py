@@ -16,6 +16,7 @@ import uvicorn
 from stridecast.errors import InputError
 from stridecast.formats.vmc import VmcSender
 from stridecast.live.app import make_app
+from stridecast.live.cast import Costume
 from stridecast.live.hall import EMPTY, MOST_SESSIONS, Hall
 from stridecast.live.limits import usual_limits
 from stridecast.live.messages import LARGEST_MESSAGE, LimitsPart
@@ -44,6 +45,8 @@ class LiveServer:
     ----------
     database, name
         What is walked with, and how it is called.
+    costume
+        The character in whose body ``database`` is (see ``cast``).
     scene
         The scene that sessions begin with, as its file says it; none if left out.
     host
@@ -69,6 +72,7 @@ class LiveServer:
         database: MotionDatabase,
         name: str = "sample database",
         *,
+        costume: Costume | None = None,
         scene: Mapping[str, Any] | None = None,
         host: str | None = None,
         port: int | None = None,
@@ -91,6 +95,7 @@ class LiveServer:
         self.hall = Hall(
             database=database,
             name=name,
+            costume=costume,
             scene=EMPTY if scene is None else dict(scene),
             limits=limits or usual_limits(),
             most_sessions=MOST_SESSIONS if most_sessions is None else most_sessions,

@@ -15,21 +15,21 @@ from typing import Any, Literal
 from stridecast import __version__
 from stridecast.crowd.rules import RULES
 from stridecast.errors import InputError
-from stridecast.formats.motion_files import write_motion
 from stridecast.formats.scenes import parse_scene, scene_of, scene_text, scene_values
 from stridecast.formats.store import load_database, save_database
 from stridecast.formats.vmc import VmcSender
 from stridecast.live import messages as say
 from stridecast.live.browsing import Browsing
 from stridecast.live.building import Building
-from stridecast.live.exporting import write_figures, write_motions, write_walk, write_ways
+from stridecast.live.cast import Costume, cast
+from stridecast.live.exporting import write_clip, write_figures, write_motions, write_walk, write_ways
 from stridecast.live.hall import Guest, Hall
 from stridecast.live.layout import CLAMPED
 from stridecast.live.outbox import Outbox
 from stridecast.live.pacing import Pacer
 from stridecast.live.scene_play import Gone, ScenePlay
 from stridecast.live.staging import place_in
-from stridecast.live.telling import database_part, database_state, skeleton_part
+from stridecast.live.telling import character_part, database_part, database_state, skeleton_part
 from stridecast.live.walking import Walking
 from stridecast.model.database import MotionDatabase
 
@@ -102,7 +102,7 @@ class Stage(threading.Thread):
             self._run()
 
     def _run(self) -> None:
-        self._guarded("database", lambda: self._use(self.hall.database, self.hall.name, built=False))
+        self._guarded("database", lambda: self._use(self.hall.database, self.hall.name, self.hall.costume, built=False))
         if not hasattr(self, "walking"):  # the error has been told; there is nothing to be played with
             return
         told = time.monotonic()
@@ -120,12 +120,13 @@ class Stage(threading.Thread):
                 told = now
                 self._tell_health()
 
-    def _use(self, database: MotionDatabase, name: str, *, built: bool) -> None:
+    def _use(self, database: MotionDatabase, name: str, costume: Costume | None, *, built: bool) -> None:
         """Begin anew with a database; where nobody can walk with it, nothing has changed."""
         tell = self.outbox.tell
         walking = Walking(database, tell)
-        self.database, self.name, self.walking = database, name, walking
+        self.database, self.name, self.walking, self.costume = database, name, walking, costume
         self.guest.skeleton = database.skeleton
+        self.guest.character = costume.file if costume is not None and costume.has_meshes else None
         self.scene = ScenePlay(
             database,
             tell,
@@ -143,6 +144,7 @@ class Stage(threading.Thread):
                 session=self.word,
                 database=database_part(database, name, built),
                 skeleton=skeleton_part(database.skeleton),
+                character=None if costume is None else character_part(costume),
                 settings=self.walking.settings,
                 rules=list(RULES),
                 bounds=list(CLAMPED),
@@ -314,11 +316,20 @@ class Stage(threading.Thread):
 
     def _change_database(self, message: say.UseMessage) -> None:
         if message.database == "given":
-            self._use(self.hall.database, self.hall.name, built=False)
+            self._use(self.hall.database, self.hall.name, self.hall.costume, built=False)
         elif self._built is None:
             raise InputError("no database has been built yet; upload recordings and build one")
         else:
-            self._use(self._built, "own recordings", built=True)
+            self._use(*self._cast(self._built), built=True)
+
+    def _cast(self, database: MotionDatabase) -> tuple[MotionDatabase, str, Costume | None]:
+        """A built database in the body that the server's is in."""
+        costume, name = self.hall.costume, "own recordings"
+        if costume is None:
+            return database, name, None
+        progress = lambda done, total: self._tell_progress("cast", done, total)  # noqa: E731
+        database, costume = cast(database, costume.file, costume.character.skeleton, progress)
+        return database, name, costume
 
     # files
 
@@ -326,6 +337,7 @@ class Stage(threading.Thread):
         """Make a file of what was played in the mode that is on, while everything else goes on."""
         if self._exporting:
             raise InputError("another file is being made; wait for it")
+        costume = self.costume
         write: Callable[[Path], None]
         if message.what == "database":
             built = self._built
@@ -334,7 +346,7 @@ class Stage(threading.Thread):
             name, write = "own.safetensors", lambda path: save_database(built, path)
         elif self.mode == "walk":
             journey = self.walking.journey()
-            name, write = f"walk.{message.what}", lambda path: write_walk(path, journey, message.what)
+            name, write = f"walk.{message.what}", lambda path: write_walk(path, journey, message.what, costume)
         elif self.mode == "database":
             name, write = f"clip.{message.what}", self._write_clip(message.what)
         elif message.what == "csv":
@@ -364,7 +376,8 @@ class Stage(threading.Thread):
             raise InputError("choose a segment, or mine for one, before it is saved")
         if what == "csv":
             raise InputError("a clip is saved as BVH or GLB")
-        return lambda path: write_motion(path, motion)
+        costume = self.costume
+        return lambda path: write_clip(path, motion, costume)
 
     def _write_crowd(self, what: str) -> Callable[[Path], None]:
         crowd = self.scene.crowd
@@ -381,7 +394,8 @@ class Stage(threading.Thread):
                 self._tell_progress("export", done, total)
 
         write = write_motions if what == "bvh" else write_figures
-        return lambda path: write(path, frames, crowd, progress)
+        costume = self.costume
+        return lambda path: write(path, frames, crowd, costume, progress)
 
     # playing
 

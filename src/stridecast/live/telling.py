@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from stridecast.crowd.bodies import stature
+from stridecast.body.character import stature
 from stridecast.database.clips import find_clips
 from stridecast.database.graph import connect
 from stridecast.live.messages import (

@@ -121,6 +121,11 @@ class MotionDatabase:
         What each example shows: velocity, turn, style.
     bounds_method
         How bounds were learned, ``balanced`` or ``paper``.
+    sole
+        Height of the toe joints of feet that stand flat, metres; None for that to which recordings are brought.
+    person
+        Height of a person who is as large as the skeleton, metres; None for that of the skeleton. They differ where the
+        skeleton is that of somebody else than the people who were recorded.
     """
 
     skeleton: Skeleton
@@ -131,6 +136,8 @@ class MotionDatabase:
     takes: tuple[Take, ...]
     annotations: Annotations
     bounds_method: str = "balanced"
+    sole: float | None = None
+    person: float | None = None
 
     def __post_init__(self) -> None:
         array = np.array(self.references, np.float64)
@@ -144,6 +151,10 @@ class MotionDatabase:
             raise DatabaseError("groups and examples differ in number")
         if len(self.annotations) != len(self.examples.durations):
             raise DatabaseError("annotations and examples differ in number")
+        if self.sole is not None and not (np.isfinite(self.sole) and self.sole >= 0):
+            raise DatabaseError(f"toe joints of flat feet must be at a height of 0 or more, not {self.sole}")
+        if self.person is not None and not (np.isfinite(self.person) and self.person > 0):
+            raise DatabaseError(f"a person must have a height above 0, not {self.person}")
         if not (np.isfinite(self.frame_rate) and 10 <= self.frame_rate <= 240):
             raise DatabaseError(f"the frame rate must lie between 10 and 240 Hz, not at {self.frame_rate}")
 

@@ -21,6 +21,7 @@ from stridecast.body import kinematics
 from stridecast.body.legs import reach
 from stridecast.body.limits import within_limits
 from stridecast.body.planting import Feet
+from stridecast.database.poses import GENERIC, planted_rows, poses_of, tangents_of
 from stridecast.geometry import pyramid, signals
 from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import SIDES
@@ -47,9 +48,6 @@ LEGS = 0.65
 
 FADE = 0.15
 """What a stance does to the movement of a foot is forgotten within this part of a half cycle."""
-
-GENERIC = np.clip(np.arange(-MARGIN, INTERVALS + MARGIN + 1) / INTERVALS, 0.0, 1.0)
-
 
 _LOCK = Lock()
 _KEPT: WeakKeyDictionary[MotionDatabase, Array] = WeakKeyDictionary()
@@ -158,12 +156,12 @@ def _planted(
     """The larger poses with their feet where they stand; half-way through a swing they are where they will."""
     skeleton, references = database.skeleton, database.references
     count = len(own)
-    was, root = _pose(database, own)
-    turned, _ = _pose(database, larger)
+    was, root = poses_of(references, own.reshape(-1, own.shape[-1]))
+    turned, _ = poses_of(references, larger.reshape(-1, own.shape[-1]))
     above = root + [0.0, 1.0, 0.0] * (larger - own)[..., -3:-2].reshape(-1, 1)
     turned = within_limits(skeleton, turned, was)
     before = kinematics.forward(skeleton, root, was)
-    planted = _contacts(group)
+    planted = planted_rows(group)
     feet, toes = skeleton.chain("left_foot", "right_foot"), skeleton.chain("left_toe", "right_toe")
     after = kinematics.forward(skeleton, above, turned)
     shape = (count, ROWS, 2)
@@ -180,27 +178,9 @@ def _planted(
         turned[:, feet[side]] = quat.multiply(quat.inverse(over), goals.turns[..., side, :].reshape(-1, 4))
         turned = reach(skeleton, above, turned, name, ankles[side].reshape(-1, 3))
     out = larger.copy()
-    tangents = quat.log(quat.multiply(quat.inverse(references), turned[:, 1:]))
-    out[..., : 3 * (skeleton.joints - 1)] = tangents.reshape(count, ROWS, -1)
+    out[..., : 3 * (skeleton.joints - 1)] = tangents_of(references, turned).reshape(count, ROWS, -1)
     out[..., -3] = above[:, 1].reshape(count, ROWS)
     return out
-
-
-def _pose(database: MotionDatabase, features: Array) -> tuple[Float[Array, "poses joints 4"], Float[Array, "poses 3"]]:
-    """Rotations and root of features, the vehicle at the origin and facing ahead."""
-    flat = features.reshape(-1, features.shape[-1])
-    tilt = 3 * (database.skeleton.joints - 1)
-    rotations = np.empty((len(flat), database.skeleton.joints, 4))
-    rotations[:, 0] = quat.multiply(quat.about_y(flat[:, -1]), quat.exp(flat[:, tilt : tilt + 3]))
-    tangents = flat[:, :tilt].reshape(len(flat), -1, 3)
-    rotations[:, 1:] = quat.multiply(database.references, quat.exp(tangents))
-    return rotations, flat[:, tilt + 3 : tilt + 6].copy()
-
-
-def _contacts(group: MotionGroup) -> Bool[Array, "rows 2"]:
-    """Which foot stands at each row."""
-    states = [group.string[k] for k in np.searchsorted(np.array(group.keys), GENERIC, side="right")]
-    return np.array([(state in "LDS", state in "RDS") for state in states])
 
 
 def _bridged(free: Feet, wanted: Feet, group: MotionGroup) -> Feet:
@@ -209,7 +189,7 @@ def _bridged(free: Feet, wanted: Feet, group: MotionGroup) -> Feet:
     Segments must meet: at a boundary a swinging foot does what it would, but in mid-flight the one that is about to
     land is as wanted.
     """
-    toes, turns, planted = free.toes.copy(), free.turns.copy(), _contacts(group)
+    toes, turns, planted = free.toes.copy(), free.turns.copy(), planted_rows(group)
     for side in range(2):
         turned = quat.log(quat.multiply(wanted.turns[:, :, side], quat.inverse(free.turns[:, :, side])))
         change = np.concatenate((wanted.toes[:, :, side] - free.toes[:, :, side], turned), axis=-1)

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool
 
-from stridecast.analysis.take import SOLE
 from stridecast.body import kinematics
 from stridecast.database.graph import UNREACHABLE, TransitionGraph, connect
+from stridecast.database.poses import poses_of, sole_height
 from stridecast.errors import DatabaseError
 from stridecast.geometry import quaternions as quat
 from stridecast.model.contacts import SIDES
@@ -175,7 +175,7 @@ def make_tables(database: MotionDatabase, subject: str | None = None) -> Tables:
         hinges=_hinges(database),
         bones=_bones(skeleton),
         tips=_tips(skeleton),
-        sole=SOLE * skeleton.leg_length,
+        sole=sole_height(database),
     )
 
 
@@ -328,10 +328,8 @@ def _swings(group: MotionGroup) -> float:
 def _home(database: MotionDatabase, stance: Array) -> Array:
     """Where the toes are under somebody who stands so: left and ahead of the vehicle."""
     skeleton = database.skeleton
-    tilt = 3 * (skeleton.joints - 1)
-    root = quat.multiply(quat.about_y(stance[tilt + 6]), quat.exp(stance[tilt : tilt + 3]))
-    joints = quat.multiply(database.references, quat.exp(stance[:tilt].reshape(-1, 3)))
-    world = kinematics.forward(skeleton, stance[tilt + 3 : tilt + 6], np.concatenate((root[None], joints)))
+    rotations, root = poses_of(database.references, stance)
+    world = kinematics.forward(skeleton, root, rotations)
     return world.positions[[skeleton.joint(f"{side}_toe") for side in SIDES]][:, [0, 2]]
 
 

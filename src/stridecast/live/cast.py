@@ -1,0 +1,54 @@
+"""In whose body everybody walks, where it is that of a character's file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from stridecast.body.character import Character, character_of
+from stridecast.database.casting import cast_database
+from stridecast.model.database import MotionDatabase
+from stridecast.model.motion import Motion
+from stridecast.model.skeleton import Skeleton
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Costume:
+    """A character who moves as the people of one database do: ``file`` is where its skeleton and meshes are from."""
+
+    file: Path
+    character: Character
+
+    @property
+    def has_meshes(self) -> bool:
+        """Whether the file may hold meshes."""
+        return self.file.suffix.lower() == ".glb"
+
+
+def cast(
+    database: MotionDatabase, file: Path, skeleton: Skeleton, progress: Callable[[int, int], None] | None = None
+) -> tuple[MotionDatabase, Costume]:
+    """A database as it is walked with in the body of a character, and the character.
+
+    Parameters
+    ----------
+    database
+        What was learned.
+    file, skeleton
+        The character's file, and the skeleton in it (``load_skeleton``).
+    progress
+        See ``cast_database``.
+
+    Raises
+    ------
+    SkeletonError
+        A joint of hips or legs is missing.
+    """
+    character = character_of(skeleton, database.skeleton)
+    return cast_database(database, character.body, progress=progress), Costume(file=file, character=character)
+
+
+def worn(costume: Costume | None, motion: Motion) -> Motion:
+    """A motion on the character's whole skeleton, if there is one."""
+    return motion if costume is None else costume.character.played(motion)
