@@ -204,6 +204,29 @@ def test_walkers_are_played_to_receivers_a_port_each(learned):
         assert abs(heard(receivers[1], 0.3)[1]) < 0.2  # nobody steers the other
 
 
+def test_people_of_a_scene_are_played_to_receivers_a_port_each(learned):
+    with ExitStack() as stack:
+        receivers = [stack.enter_context(receiver) for receiver in neighbours()]
+        for receiver in receivers:
+            receiver.settimeout(20.0)
+        where = receivers[0].getsockname()
+        running = stack.enter_context(LiveServer(learned, port=0, receiver=where, received=2).running())
+        guest = Client(stack.enter_context(open_socket(running)))
+        guest.until("welcome")
+        guest.say("mode", mode="scene")
+        starts = [[0, 0], [4, 0], [8, 0]]
+        scene = {"people": [{"start": start, "goals": [[start[0], 30]]} for start in starts]}
+        guest.say("scene", scene=scene, request=1)
+        guest.until("scene_checked")
+        guest.say("playback", action="play")
+        frame = guest.until_frame(SCENE, lambda f: f.time > 2.0)
+        ahead = dict(zip(frame.arrays["ids"].tolist(), frame.arrays["places"][:, 1].tolist(), strict=True))
+        for number, receiver in zip((1, 2), receivers, strict=True):
+            when, z = heard(receiver, frame.time)
+            assert z == pytest.approx(ahead[number], abs=0.25 + 1.6 * (when - frame.time))
+            assert z > 1.0
+
+
 # what is wrong is told, and changes nothing
 
 

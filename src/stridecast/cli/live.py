@@ -34,8 +34,17 @@ Vmc = Annotated[
     str | None,
     typer.Option(
         metavar="HOST:PORT",
-        help="Play the walker to a receiver of the VMC protocol as well; of more clients each has the next port.",
+        help="Play who is on the page to a receiver of the VMC protocol too; more clients have the next ports.",
         show_default=False,
+    ),
+]
+VmcPeople = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        max=16,
+        metavar="N",
+        help="In scene mode play so many people to receivers, those who came first, each to a port of their own.",
     ),
 ]
 Skeleton = Annotated[
@@ -57,12 +66,13 @@ def live(
     host: Host = None,
     port: Port = None,
     vmc: Vmc = None,
+    vmc_people: VmcPeople = 1,
     skeleton: Skeleton = None,
     browser: Browser = True,
     quiet: Quiet = False,
 ) -> None:
     """Open the page: steer a walker by hand, draw scenes and watch crowds in them, look through the database."""
-    _serve(database, scene, host, port, vmc, skeleton, browser, quiet)
+    _serve(database, scene, host, port, vmc, vmc_people, skeleton, browser, quiet)
 
 
 def demo(
@@ -70,12 +80,13 @@ def demo(
     host: Host = None,
     port: Port = None,
     vmc: Vmc = None,
+    vmc_people: VmcPeople = 1,
     skeleton: Skeleton = None,
     browser: Browser = True,
     quiet: Quiet = False,
 ) -> None:
     """Open the page with the sample database, which needs no recordings."""
-    _serve(None, scene, host, port, vmc, skeleton, browser, quiet)
+    _serve(None, scene, host, port, vmc, vmc_people, skeleton, browser, quiet)
 
 
 def _serve(
@@ -84,13 +95,14 @@ def _serve(
     host: str | None,
     port: int | None,
     vmc: str | None,
+    vmc_people: int,
     skeleton: Path | None,
     browser: bool,
     quiet: bool,
 ) -> None:
     from stridecast.cli import screen
-    from stridecast.formats.vmc import parsed_address
     from stridecast.formats.recordings import load_skeleton
+    from stridecast.formats.vmc import parsed_address
     from stridecast.live.cast import cast
     from stridecast.live.serve import LiveServer
 
@@ -103,7 +115,9 @@ def _serve(
         with screen.progress(quiet, {"cast": "playing all segments by the character"}) as progress:
             learned, costume = cast(learned, skeleton, character, lambda done, total: progress("cast", done, total))
     name = "sample database" if database is None else database.stem
-    server = LiveServer(learned, name, costume=costume, scene=place, host=host, port=port, receiver=receiver)
+    server = LiveServer(
+        learned, name, costume=costume, scene=place, host=host, port=port, receiver=receiver, received=vmc_people
+    )
     with screen.progress(quiet, {}):
         try:
             server.run(ready=lambda: _tell(server, browser=browser, quiet=quiet))

@@ -32,8 +32,11 @@ BUNDLE = Path(__file__).parent / "static"
 
 @dataclass(eq=False)
 class Guest:
-    """What a session keeps in files, the skeleton of those whom it shows and its character's file, and its number among
-    those who are there."""
+    """What a session keeps in files, and whom it shows.
+
+    ``skeleton`` is theirs, ``character`` the file that has their meshes, ``seat`` the session's number among those who
+    are there.
+    """
 
     folder: Path
     uploads: Uploads
@@ -64,8 +67,9 @@ class Hall:
     bundle
         Folder of the page.
     receiver
-        Host and port to which the walker of the first seat is played by the VMC protocol; that of the next goes to the
-        next port.
+        Host and port to which the first seat is played by the VMC protocol (see ``Receivers``).
+    received
+        So many ports each seat has, side by side.
     """
 
     database: MotionDatabase
@@ -77,6 +81,7 @@ class Hall:
     threads: int = field(default_factory=lambda: max(1, min(4, (os.cpu_count() or 1))))
     bundle: Path = BUNDLE
     receiver: tuple[str, int] | None = None
+    received: int = 1
     guests: dict[str, Guest] = field(default_factory=dict)
     _folder: tempfile.TemporaryDirectory[str] | None = None
 

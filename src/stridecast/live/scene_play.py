@@ -282,12 +282,16 @@ class ScenePlay:
         self._known = len(crowd.came)
 
     def _shown(self) -> bytes:
-        time, figures = self.timeline.at(self.timeline.last if self._cursor is None else self._cursor)
+        time, figures = self.now()
         self.frames += 1
         self._stale = False
         rows, full = self._near(figures)
         flags = 0 if self._cursor is None else REPLAYED
         return encode(SCENE, self.frames, time, figures.chosen(rows, full), flags=flags)
+
+    def now(self) -> tuple[float, Figures]:
+        """Everybody who is shown, with their poses, and the time on the crowd's clock."""
+        return self.timeline.at(self.timeline.last if self._cursor is None else self._cursor)
 
     def _near(self, figures: Figures) -> tuple[Int[Array, "figures"], int]:
         """Everybody, those first who come with poses, the nearest first; and how many these are."""

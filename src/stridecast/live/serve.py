@@ -34,6 +34,9 @@ PORT = 8047
 MOST_CONNECTIONS = 100
 """So many are open at once, of all kinds; more are answered with status 503."""
 
+MOST_RECEIVED = 16
+"""So many people of a scene are played to receivers at most; for crowds there is the websocket."""
+
 SEND_BUFFER = 256 * 1024
 """What a slow client has not taken waits in the system up to so many bytes; else frames of seconds would."""
 
@@ -58,8 +61,10 @@ class LiveServer:
     most_sessions
         So many clients are served at once.
     receiver
-        Host and port to which walkers are played by the VMC protocol, that of the first client; the next client's goes
-        to the next port.
+        Host and port to which the first client is played by the VMC protocol; the next client's port is after those of
+        the first.
+    received
+        So many people of a scene are played to receivers, a port each; a walker is to the first of them.
 
     Raises
     ------
@@ -79,7 +84,10 @@ class LiveServer:
         limits: LimitsPart | None = None,
         most_sessions: int | None = None,
         receiver: tuple[str, int] | None = None,
+        received: int = 1,
     ) -> None:
+        if not 1 <= received <= MOST_RECEIVED:
+            raise InputError(f"1 to {MOST_RECEIVED} people can be played to receivers, not {received}")
         if receiver is not None:
             VmcSender(*receiver).close()  # says what is wrong with it
         self.host = host or OWN
@@ -100,6 +108,7 @@ class LiveServer:
             limits=limits or usual_limits(),
             most_sessions=MOST_SESSIONS if most_sessions is None else most_sessions,
             receiver=receiver,
+            received=received,
         )
         config = uvicorn.Config(
             make_app(self.hall, rules),

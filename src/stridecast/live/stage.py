@@ -17,7 +17,6 @@ from stridecast.crowd.rules import RULES
 from stridecast.errors import InputError
 from stridecast.formats.scenes import parse_scene, scene_of, scene_text, scene_values
 from stridecast.formats.store import load_database, save_database
-from stridecast.formats.vmc import VmcSender
 from stridecast.live import messages as say
 from stridecast.live.browsing import Browsing
 from stridecast.live.building import Building
@@ -27,6 +26,7 @@ from stridecast.live.hall import Guest, Hall
 from stridecast.live.layout import CLAMPED
 from stridecast.live.outbox import Outbox
 from stridecast.live.pacing import Pacer
+from stridecast.live.receivers import LAST_PORT, Receivers
 from stridecast.live.scene_play import Gone, ScenePlay
 from stridecast.live.staging import place_in
 from stridecast.live.telling import character_part, database_part, database_state, skeleton_part
@@ -76,7 +76,7 @@ class Stage(threading.Thread):
         self._build_request = 0
         self._built: MotionDatabase | None = None
         self._exporting = False
-        self._receiver: VmcSender | None = None
+        self._receivers: Receivers | None = None
 
     def put(self, message: object) -> bool:
         """Hand over a message; False where too many wait."""
@@ -98,7 +98,8 @@ class Stage(threading.Thread):
         with ExitStack() as stack:
             if self.hall.receiver is not None:
                 host, port = self.hall.receiver
-                self._receiver = stack.enter_context(VmcSender(host, min(port + self.guest.seat, 65535)))
+                first = min(port + self.guest.seat * self.hall.received, LAST_PORT)
+                self._receivers = stack.enter_context(Receivers(host, first, self.hall.received))
             self._run()
 
     def _run(self) -> None:
@@ -410,10 +411,14 @@ class Stage(threading.Thread):
     def _show(self, period: float, in_time: Callable[[], bool]) -> None:
         if self.mode == "walk":
             frame: bytes | None = self.walking.step()
-            if self._receiver is not None:
-                self._receiver.send(self.database.skeleton, self.walking.pose, self.walking.time)
+            if self._receivers is not None:
+                self._receivers.play_walker(self.database.skeleton, self.walking.pose, self.walking.time)
         elif self.mode == "scene":
             frame = self.scene.step(period, in_time)
+            crowd = self.scene.crowd
+            if self._receivers is not None and crowd is not None and frame is not None:
+                time_now, figures = self.scene.now()
+                self._receivers.play_crowd(crowd, figures, time_now)
         else:
             frame = self.browsing.step(period)
         if frame is not None:

@@ -7,8 +7,10 @@ import numpy as np
 from stridecast.body.character import stature
 from stridecast.database.clips import find_clips
 from stridecast.database.graph import connect
+from stridecast.live.cast import Costume
 from stridecast.live.messages import (
     BoundsPart,
+    CharacterPart,
     DatabasePart,
     DatabaseState,
     ExampleColumns,
@@ -35,6 +37,11 @@ def skeleton_part(skeleton: Skeleton) -> SkeletonPart:
         end_offsets=[_three(row) for row in skeleton.end_offsets.tolist()],
         height=stature(skeleton),
     )
+
+
+def character_part(costume: Costume) -> CharacterPart | None:
+    """The file of a character that has meshes, and how it is posed."""
+    return None
 
 
 def database_part(database: MotionDatabase, name: str, built: bool) -> DatabasePart:
