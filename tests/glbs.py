@@ -16,7 +16,7 @@ import numpy as np
 
 TESTS = Path(__file__).resolve().parent
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-WIDE = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+WIDE = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 class Glb:
@@ -74,14 +74,14 @@ class Glb:
                 moved.get((node, path), np.array(own.get(path, usual)))
                 for path, usual in (("translation", [0, 0, 0]), ("rotation", [0, 0, 0, 1]), ("scale", [1, 1, 1]))
             )
-            local = np.eye(4)
-            local[:3, :3] = matrix(turn) * size
-            local[:3, 3] = place
+            local = np.array(own.get("matrix", np.eye(4)), float).reshape(4, 4).T
+            if "matrix" not in own:
+                local[:3, :3], local[:3, 3] = matrix(turn) * size, place
             out[node] = above @ local
             for child in own.get("children", ()):
                 visit(child, out[node])
 
-        for root in self["scenes"][0].get("nodes", ()):
+        for root in self["scenes"][self.document.get("scene", 0)].get("nodes", ()):
             visit(root, np.eye(4))
         return out
 
@@ -95,6 +95,21 @@ class Glb:
         joints, weights = self.array(attributes["JOINTS_0"]).astype(int), self.array(attributes["WEIGHTS_0"])
         ones = np.concatenate((places, np.ones((len(places), 1))), axis=1)
         return np.einsum("vk,vkij,vj->vi", weights, carry[joints], ones)[:, :3]
+
+    def seen(self, node: int, worlds: np.ndarray) -> np.ndarray:
+        """Where the vertices of a node's mesh are, skinned or rigid."""
+        told = self["nodes"][node]
+        if "skin" in told:
+            return self.skinned(told["skin"], told["mesh"], worlds)
+        places = self.array(self["meshes"][told["mesh"]]["primitives"][0]["attributes"]["POSITION"])
+        return places @ worlds[node][:3, :3].T + worlds[node][:3, 3]
+
+    def below(self, node: int) -> list[int]:
+        """A node and all that hangs from it."""
+        line = [node]
+        for one in line:
+            line += self["nodes"][one].get("children", ())
+        return line
 
 
 def matrix(turn: np.ndarray) -> np.ndarray:

@@ -36,6 +36,9 @@ ADULT_LEG = (0.7, 1.0)
 DEFAULT_RATE = 120.0
 """Frames a second of recordings that do not say (AMC; it is the rate of the CMU database)."""
 
+BELIEVED = (0.1, 10.0)
+"""A leg that is shorter or longer than this, metres, tells that the unit which a file states is not what it has."""
+
 LARGEST_SPEED = 8.0
 """A root that moves faster than this, m/s, is a broken recording."""
 
@@ -160,6 +163,9 @@ def _unit(skeleton: Skeleton, stated: float | None, scale: float | None, notes: 
     if scale is not None and not (np.isfinite(scale) and scale > 0):
         raise InputError(f"the scale must be a positive number of metres per unit, not {scale}")
     unit = stated if scale is None else scale
+    if scale is None and unit is not None and not BELIEVED[0] <= leg * unit <= BELIEVED[1]:
+        notes.append(f"the leg would be {leg * unit:.3g} m long at the {unit:.4g} m per unit that the file states")
+        unit = None
     if unit is not None:
         if not ADULT_LEG[0] <= leg * unit <= ADULT_LEG[1]:
             notes.append(f"the leg is {leg * unit:.3g} m long at {unit:.4g} m per unit, which is not an adult's")

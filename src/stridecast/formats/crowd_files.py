@@ -22,7 +22,8 @@ from stridecast.errors import FileError
 from stridecast.formats.bvh import write_bvh
 from stridecast.formats.bvh_conventions import BvhConvention
 from stridecast.formats.files import check_place
-from stridecast.formats.glb import GlbCrowd, Planted, check_compact
+from stridecast.formats.glb import GlbCrowd, check_compact
+from stridecast.formats.glb_figure import Planted
 from stridecast.formats.trajectories import load_trajectories
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
 from stridecast.formats.usd import ENDINGS as USD

@@ -12,19 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from stridecast.body.mannequin import mannequin
 from stridecast.errors import FileError, InputError
-from stridecast.formats.glb_figure import Figure, Keys, plants
+from stridecast.formats.glb_figure import Figure, Keys, Planted, moved_as_ours, plants, provenance
+from stridecast.formats.glb_rig_figure import RigFigure
 from stridecast.formats.gltf import GltfWriter
 from stridecast.model.mesh import SkinnedMesh
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
 
 Array = np.ndarray
-
-Planted = Bool[Array, "frames 2"]
 
 ALIKE = 1e-6
 """Bodies whose bones are alike to this share of their length are one body in different sizes."""
@@ -120,8 +119,8 @@ def write_glb(
     nodes = figure.place("Mannequin", takes[0])
     for k, (take, own) in enumerate(zip(takes, feet, strict=True)):
         keys = Keys(writer)
-        keys.move(nodes.joints, take, compact=compact)
-        extras = {**_provenance(take), **({} if own is None else {"foot_plants": plants(own, take.frame_rate)})}
+        keys.move(moved_as_ours(take, nodes.joints), take.frame_rate, compact=compact)
+        extras = {**provenance(take), **({} if own is None else {"foot_plants": plants(own, take.frame_rate)})}
         keys.save(take.name or f"Take {k + 1}", extras)
     writer.save(path, _head(nodes.roots))
 
@@ -142,18 +141,26 @@ class GlbCrowd:
         Where it is to be.
     compact
         As of ``write_glb``.
+    character
+        A rigged GLB that everybody is, in any size: with its meshes, materials and skins, which are in the file once
+        (see ``RigFigure``). Left out: the mannequin.
 
     Raises
     ------
     FileError
-        The file system refuses.
+        The character cannot be read or carried over, or the file system refuses.
     """
 
-    def __init__(self, path: str | Path, *, compact: bool = False) -> None:
+    def __init__(
+        self, path: str | Path, *, compact: bool = False, character: str | Path | RigFigure | None = None
+    ) -> None:
         self.path = Path(path)
         self.compact = compact
         self.people = 0
+        self._worn = RigFigure(character) if isinstance(character, (str, Path)) else character
         self._writer = GltfWriter(path)
+        if self._worn is not None:
+            self._worn.rig.embed(self._writer)
         self._keys = Keys(self._writer)
         self._figures: list[tuple[Skeleton, Figure]] = []
         self._roots: list[int] = []
@@ -169,7 +176,7 @@ class GlbCrowd:
         InputError
             ``start`` is no number, or ``planted`` has another length than the motion.
         SkeletonError
-            The skeleton has no roles to make a skin.
+            The skeleton has no roles to make a skin, or is not that of the character.
         FileError
             The disk is full, or the file would be larger than 4 GB.
         """
@@ -177,15 +184,20 @@ class GlbCrowd:
             raise InputError(f"the start must be a number of seconds, not {start}")
         if planted is not None and len(planted) != motion.frames:
             raise InputError(f"planted must have a row for each of {motion.frames} frames, not {len(planted)}")
-        figure, scale = self._figure_of(motion.skeleton)
-        extras: dict[str, Any] = {"start": start, **_provenance(motion)}
+        extras: dict[str, Any] = {"start": start, **provenance(motion)}
         if planted is not None:
             extras["foot_plants"] = plants(planted, motion.frame_rate, start)
-        nodes = figure.place(name or motion.name or f"Person {self.people + 1}", motion, scale=scale, extras=extras)
-        self._keys.move(nodes.joints, motion, start=start, scale=scale, compact=self.compact)
+        name = name or motion.name or f"Person {self.people + 1}"
+        if self._worn is not None:
+            nodes, moved = self._worn.place(self._writer, name, motion, extras=extras)
+        else:
+            figure, scale = self._figure_of(motion.skeleton)
+            nodes = figure.place(name, motion, scale=scale, extras=extras)
+            moved = moved_as_ours(motion, nodes.joints, scale)
+        self._keys.move(moved, motion.frame_rate, start=start, compact=self.compact)
         end = start + motion.seconds
         half = 0.5 / motion.frame_rate  # between frames, so that rounding hides nobody in their first or last one
-        self._hidden.append((nodes.person, scale, start - half, end + half))
+        self._hidden.append((nodes.person, moved.scale, start - half, end + half))
         self._first, self._last = min(self._first, start), max(self._last, end)
         self._rate = max(self._rate, motion.frame_rate)
         self._roots += nodes.roots
@@ -206,7 +218,8 @@ class GlbCrowd:
                 self._keys.show(node, scale, start - origin, end - origin, self._last - origin)
             told = {"origin": origin, "seconds": self._last - origin, "frame_rate": self._rate}
             self._keys.save("Crowd", told, origin=origin)
-        self._writer.save(self.path if path is None else path, _head(self._roots))
+        told = {} if self._worn is None else self._worn.head()
+        self._writer.save(self.path if path is None else path, _head(self._roots, told))
         self.close()
 
     def close(self) -> None:
@@ -225,15 +238,12 @@ class GlbCrowd:
         return figure, 1.0
 
 
-def _head(roots: Sequence[int]) -> Mapping[str, object]:
+def _head(roots: Sequence[int], told: Mapping[str, Any] | None = None) -> Mapping[str, object]:
+    """What a document says beside its lists; ``told`` is more of that."""
+    more = dict(told or {})
+    asset = {**more.pop("asset", {}), "version": "2.0", "generator": "stridecast"}
     scene: dict[str, object] = {"nodes": list(roots)} if roots else {}
-    return {"asset": {"version": "2.0", "generator": "stridecast"}, "scene": 0, "scenes": [scene]}
-
-
-def _provenance(motion: Motion) -> dict[str, Any]:
-    """Where a motion comes from; only the file's name, as folders are nobody else's business."""
-    told = {"subject": motion.subject, "source": Path(motion.source).name}
-    return {"frame_rate": motion.frame_rate, "frames": motion.frames, **{k: v for k, v in told.items() if v}}
+    return {**more, "asset": asset, "scene": 0, "scenes": [scene]}
 
 
 def _scale(known: Skeleton, skeleton: Skeleton) -> float:

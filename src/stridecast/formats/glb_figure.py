@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,24 @@ SHORT = 32767
 
 COLOR = (0.62, 0.60, 0.57, 1.0)
 """Of the mannequin, linear."""
+
+
+Planted = Bool[Array, "frames 2"]
+
+
+class Moved(NamedTuple):
+    """A motion as nodes of a file have it, each in its parent's frame."""
+
+    nodes: Sequence[int]
+    turns: Float[Array, "nodes frames 4"]
+    root: int
+    """The node that is placed, ..."""
+
+    places: Float[Array, "frames 3"]
+    """... and where."""
+
+    scale: float
+    """How much larger the body of the motion is than that of the file."""
 
 
 class Nodes(NamedTuple):
@@ -69,12 +88,7 @@ class Figure:
         children: list[list[int]] = [[] for _ in range(s.joints)]
         for joint in range(1, s.joints):
             children[s.parents[joint]].append(first + joint)
-        person: dict[str, Any] = {"name": _free(name, s.names), "children": [first]}
-        if scale != 1.0:
-            person["scale"] = [scale] * 3
-        if extras:
-            person["extras"] = {"stridecast": extras}
-        node = w.add("nodes", person)
+        node = w.add("nodes", person_node(free_name(name, s.names), [first], scale, extras))
         offsets = s.offsets.copy()
         offsets[0] = (0.0, self._lift, 0.0) if motion is None else motion.root_positions[0] / scale
         roles: dict[int, str] = {}
@@ -82,11 +96,11 @@ class Figure:
             roles.setdefault(joint, role)
         ends: dict[int, list[list[float]]] = {}
         for joint, end in zip(s.end_joints.tolist(), s.end_offsets.tolist(), strict=True):
-            ends.setdefault(joint, []).append(_numbers(end))
+            ends.setdefault(joint, []).append(numbers(end))
         for joint in range(s.joints):
-            what: dict[str, Any] = {"name": s.names[joint], "translation": _numbers(offsets[joint])}
+            what: dict[str, Any] = {"name": s.names[joint], "translation": numbers(offsets[joint])}
             if motion is not None:
-                what["rotation"] = _numbers(_turned(motion.rotations[0, joint]))
+                what["rotation"] = numbers(turned(motion.rotations[0, joint]))
             if children[joint]:
                 what["children"] = children[joint]
             own: dict[str, Any] = {}
@@ -100,7 +114,7 @@ class Figure:
         joints = list(range(first, first + s.joints))
         skin = w.add("skins", {"inverseBindMatrices": self._binds, "joints": joints})
         # a node of the scene itself: what is above a skinned mesh does not move it
-        skinned = w.add("nodes", {"name": _free(f"{name} skin", s.names), "mesh": self._mesh, "skin": skin})
+        skinned = w.add("nodes", {"name": free_name(f"{name} skin", s.names), "mesh": self._mesh, "skin": skin})
         return Nodes(node, joints, [node, skinned])
 
 
@@ -119,17 +133,12 @@ class Keys:
         self._channels: list[str] = []
         self._times: dict[tuple[float, int, float], int] = {}
 
-    def move(
-        self, joints: Sequence[int], motion: Motion, *, start: float = 0.0, scale: float = 1.0, compact: bool = False
-    ) -> None:
-        """Add a motion from a time on; root positions are divided by the scale of the person."""
+    def move(self, moved: Moved, frame_rate: float, *, start: float = 0.0, compact: bool = False) -> None:
+        """Add a motion from a time on."""
         w = self._writer
-        times = self._times_of(start, motion.frames, motion.frame_rate)
-        roots = (motion.root_positions / scale).astype("<f4")
-        self._channel(joints[0], "translation", times, w.accessor(roots))
-        turns = np.empty((motion.skeleton.joints, motion.frames, 4), "<f4")
-        for at, component in enumerate((1, 2, 3, 0)):
-            turns[..., at] = motion.rotations[..., component].T
+        times = self._times_of(start, len(moved.places), frame_rate)
+        self._channel(moved.root, "translation", times, w.accessor(moved.places.astype("<f4")))
+        turns = moved.turns[..., [1, 2, 3, 0]].astype("<f4")
         keys: Array = turns
         if compact:
             keys = np.rint(turns * SHORT).astype("<i2")
@@ -137,9 +146,9 @@ class Keys:
         view = w.view(keys[~rest]) if not rest.all() else -1
         size = keys[0].nbytes
         at = 0
-        for joint, node in enumerate(joints):
+        for joint, node in enumerate(moved.nodes):
             if rest[joint]:
-                once = self._times_of(start, 1, motion.frame_rate)
+                once = self._times_of(start, 1, frame_rate)
                 self._channel(node, "rotation", once, w.accessor(keys[joint, :1], normalized=compact))
                 continue
             self._channel(node, "rotation", times, w.part_of(view, at * size, keys[joint], normalized=compact))
@@ -188,7 +197,30 @@ def still(keys: Array) -> Bool[Array, "joints"]:
     return np.asarray((keys == keys[:, :1]).all(axis=(1, 2)))
 
 
-def plants(planted: Bool[Array, "frames 2"], rate: float, start: float = 0.0) -> list[dict[str, object]]:
+def moved_as_ours(motion: Motion, joints: Sequence[int], scale: float = 1.0) -> Moved:
+    """A motion of nodes that are joints of ours, below a person of a scale."""
+    return Moved(joints, motion.rotations.transpose(1, 0, 2), joints[0], motion.root_positions / scale, scale)
+
+
+def person_node(
+    name: str, children: Sequence[int], scale: float = 1.0, extras: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """A node above a body that has its size, and what there is to say of the person."""
+    person: dict[str, Any] = {"name": name, "children": list(children)}
+    if scale != 1.0:
+        person["scale"] = [scale] * 3
+    if extras:
+        person["extras"] = {"stridecast": extras}
+    return person
+
+
+def provenance(motion: Motion) -> dict[str, Any]:
+    """Where a motion comes from; only the file's name, as folders are nobody else's business."""
+    told = {"subject": motion.subject, "source": Path(motion.source).name}
+    return {"frame_rate": motion.frame_rate, "frames": motion.frames, **{k: v for k, v in told.items() if v}}
+
+
+def plants(planted: Planted, rate: float, start: float = 0.0) -> list[dict[str, object]]:
     """Foot plants as they are told in ``extras``: which foot, from when to when in seconds, in the order of time."""
     found = [
         (start + begin / rate, start + (end - 1) / rate, side)
@@ -229,16 +261,17 @@ def _whole(weights: Float[Array, "vertices 4"]) -> Array:
     return out.astype("<u2")
 
 
-def _turned(rotation: Float[Array, "4"]) -> Float[Array, "4"]:
+def turned(rotation: Float[Array, "4"]) -> Float[Array, "4"]:
     """``x y z w``, exactly of unit length in single precision."""
     return rotation[[1, 2, 3, 0]] / np.linalg.norm(rotation)
 
 
-def _numbers(values: Float[Array, "n"] | list[float]) -> list[float]:
+def numbers(values: Float[Array, "n"] | list[float]) -> list[float]:
+    """As JSON has them, to a nanometre."""
     return [number(round(float(value), 9) + 0.0) for value in values]
 
 
-def _free(name: str, taken: Sequence[str]) -> str:
+def free_name(name: str, taken: Sequence[str]) -> str:
     """A name that no joint has."""
     while name in taken:
         name += "_"

@@ -176,11 +176,22 @@ class GlbFigure:
     def over(self, node: int) -> tuple[Float[Array, "3"], Float[Array, "4"], float]:
         """The frame in which a node is placed, in the world with all nodes as they are: its place, turn and scale."""
         place, turn, size = np.zeros(3), np.array(quat.IDENTITY), 1.0
-        for above in self._over(node)[::-1]:
+        for above in self.line_over(node)[::-1]:
             place = place + size * quat.rotate(turn, self._place(above))
             turn = quat.multiply(turn, self._rest(above))
             size *= self._scale(above)
         return place, turn, size
+
+    def line_over(self, node: int) -> list[int]:
+        """Nodes over another, the nearest first."""
+        line: list[int] = []
+        parent = int(self.reader.parents[node])
+        while parent >= 0:
+            line.append(parent)
+            if len(line) > MOST_JOINTS:
+                self.reader.wrong(f"has nodes that are nested more than {MOST_JOINTS} deep")
+            parent = int(self.reader.parents[parent])
+        return line
 
     def unpack(self, node: int) -> None:
         """Give a node that has a matrix its place, turn and scale instead, so that an animation can move it."""
@@ -250,18 +261,34 @@ class GlbFigure:
                 r.wrong(f"skin {k} must have a list of joints")
             for joint in found:
                 r.one("nodes", joint, f"skin {k}")
-            if not (moving and moving.isdisjoint(found)):
-                listed = list(dict.fromkeys(found))
-                binds = self._bound(skin, k)
-                if len(skins) > 1:
-                    self.notes.append(f"of {len(skins)} skinned figures number {k + 1} is read")
-                break
+        moved = [k for k, skin in enumerate(skins) if not (moving and moving.isdisjoint(skin["joints"]))]
+        if moved:  # the skin of eyes or of a shirt, say, has few of the joints
+            first = max(moved, key=lambda k: len(set(skins[k]["joints"])))
+            listed, binds = list(dict.fromkeys(skins[first]["joints"])), self._bound(skins[first], first)
+            same = [k for k in moved if k != first and not set(listed).isdisjoint(skins[k]["joints"])]
+            for k in same:
+                self._join(skins[k], k, listed, binds)
+            if len(same) + 1 < len(skins):
+                self.notes.append(f"of {len(skins)} skinned figures number {first + 1} is read")
         if not listed:
             listed = sorted(node for node, path in self.tracks if path == "rotation")
         tree = self._tree(listed)
         if len(tree) > MOST_JOINTS:
             r.wrong(f"has a skeleton of {len(tree)} joints; at most {MOST_JOINTS} are read")
         return tree, binds
+
+    def _join(self, skin: Mapping[str, Any], number: int, listed: list[int], binds: dict[int, Array]) -> None:
+        """Add the joints of another skin of the same figure, whose bind pose may be turned as a whole."""
+        known = set(listed)
+        new = [joint for joint in dict.fromkeys(skin["joints"]) if joint not in known]
+        if not new:
+            return
+        own = self._bound(skin, number)
+        shared = next((joint for joint in own if joint in binds), None)
+        if shared is not None:
+            turn = quat.multiply(binds[shared], quat.inverse(own[shared]))
+            binds.update({joint: quat.multiply(turn, own[joint]) for joint in new})
+        listed += new
 
     def _tree(self, listed: list[int]) -> list[int]:
         """The joints that hang from the one with most of them, with the nodes that are between."""
@@ -272,7 +299,7 @@ class GlbFigure:
         inside: set[int] = set()
         lines: dict[int, list[int]] = {}
         for joint in listed:
-            line = [joint, *self._over(joint)]
+            line = [joint, *self.line_over(joint)]
             top = max(k for k, node in enumerate(line) if node in wanted)
             lines[joint] = line[: top + 1]
             count[line[top]] = count.get(line[top], 0) + 1
@@ -324,18 +351,7 @@ class GlbFigure:
 
     def _above(self) -> list[int]:
         """Nodes over the root of the figure, the topmost first."""
-        return self._over(self.root)[::-1]
-
-    def _over(self, node: int) -> list[int]:
-        """Nodes over another, the nearest first."""
-        line: list[int] = []
-        parent = int(self.reader.parents[node])
-        while parent >= 0:
-            line.append(parent)
-            if len(line) > MOST_JOINTS:
-                self.reader.wrong(f"has nodes that are nested more than {MOST_JOINTS} deep")
-            parent = int(self.reader.parents[parent])
-        return line
+        return self.line_over(self.root)[::-1]
 
     def _moved(self, node: int, path: str) -> Float[Array, "frames components"]:
         """A node's translation, or rotation as ``w x y z``, at each frame."""

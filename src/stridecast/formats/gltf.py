@@ -88,17 +88,27 @@ class GltfWriter:
         FileError
             The disk is full, or the file would be larger than a GLB can be.
         """
+        start = self.put(array)
+        use = "" if target is None else f',"target":{target}'
+        return self.add_text("bufferViews", f'{{"buffer":0,"byteOffset":{start},"byteLength":{array.nbytes}{use}}}')
+
+    def put(self, array: Array) -> int:
+        """Add numbers without a view of them; the byte at which they begin.
+
+        Raises
+        ------
+        FileError
+            As of ``view``.
+        """
         start, length = self._size, array.nbytes
         if start + length > LARGEST - (1 << 28):
             raise FileError("would be larger than the 4 GB that a GLB can hold; write fewer people", path=self._beside)
-        block = np.ascontiguousarray(array)
-        self._write(block)
+        self._write(np.ascontiguousarray(array))
         self._size += length
         if length % 4:
             self._write(np.zeros(-length % 4, np.uint8))
             self._size += -length % 4
-        use = "" if target is None else f',"target":{target}'
-        return self.add_text("bufferViews", f'{{"buffer":0,"byteOffset":{start},"byteLength":{length}{use}}}')
+        return start
 
     def accessor(
         self, array: Array, *, target: int | None = None, bounds: bool = False, normalized: bool = False
