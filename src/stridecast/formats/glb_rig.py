@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from stridecast.body import kinematics
@@ -22,6 +23,7 @@ from stridecast.formats.gltf import GltfWriter, to_json
 from stridecast.formats.gltf_reading import GltfReader
 from stridecast.geometry import quaternions as quat
 from stridecast.model.motion import Motion
+from stridecast.model.skeleton import Skeleton
 
 Array = np.ndarray
 
@@ -35,6 +37,14 @@ SHARED = ("accessors", "bufferViews", "meshes", "materials", "textures", "images
 """Lists of a document that nodes and skins point into, and that point at neither."""
 
 PACKED = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+
+
+class Fit(NamedTuple):
+    """A skeleton in a file: its joints by those of the file, how much larger it is, and how it is turned."""
+
+    joints: dict[int, int]
+    size: float
+    facing: Float[Array, "4"]
 
 
 class GlbRig:
@@ -81,13 +91,9 @@ class GlbRig:
         SkeletonError
             The motion is that of another skeleton.
         """
-        rest, body = self.rest, motion.skeleton
-        ours = {name: k for k, name in enumerate(body.names)}
-        known = {k: ours[name] for k, name in enumerate(rest.names) if name in ours}
-        root = next((k for k, own in known.items() if own == 0), None)
-        if root is None:
-            raise SkeletonError(f"the character has no joint {body.names[0]!r}; the motion is that of another skeleton")
-        size, facing = self._fitted(motion, known)
+        rest = self.rest
+        known, size, facing = self.fitted(motion.skeleton)
+        root = next(k for k, own in known.items() if own == 0)
         world = kinematics.pose(motion)
         turned: dict[int, Array] = {}
         local: dict[int, Array] = {}
@@ -104,12 +110,24 @@ class GlbRig:
             nodes=tuple(local), turns=np.stack(list(local.values())), root=rest.nodes[root], places=places, scale=size
         )
 
-    def _fitted(self, motion: Motion, known: dict[int, int]) -> tuple[float, Array]:
-        """Size of the motion's body against the file's, and the turn from the file's body at rest to it."""
+    def fitted(self, skeleton: Skeleton) -> Fit:
+        """Find a skeleton in the file.
+
+        Raises
+        ------
+        SkeletonError
+            It is not there, or has bones of other lengths.
+        """
+        ours = {name: k for k, name in enumerate(skeleton.names)}
+        known = {k: ours[name] for k, name in enumerate(self.rest.names) if name in ours}
+        if 0 not in known.values():
+            raise SkeletonError(
+                f"the character has no joint {skeleton.names[0]!r}; the motion is that of another skeleton"
+            )
         if len(known) < 2:
             raise SkeletonError("the character shares one joint with the motion; that is of another skeleton")
         theirs = self.rest.places[list(known)]
-        mine = kinematics.rest(motion.skeleton).positions[list(known.values())]
+        mine = kinematics.rest(skeleton).positions[list(known.values())]
         theirs, mine = theirs - theirs[0], mine - mine[0]
         size = float(np.linalg.norm(mine) / np.linalg.norm(theirs))
         left, _, right = np.linalg.svd(mine.T @ theirs)
@@ -117,7 +135,7 @@ class GlbRig:
         if np.abs(size * theirs @ fit.T - mine).max() > ALIKE * np.abs(mine).max():
             raise SkeletonError("the bones of the character have other lengths; the motion is that of another skeleton")
         facing = np.array(Rotation.from_matrix(fit).as_quat()[[3, 0, 1, 2]])
-        return 1.0 if abs(size - 1.0) < EXACT else size, facing
+        return Fit(known, 1.0 if abs(size - 1.0) < EXACT else size, facing)
 
 
 def extensions_in(content: object) -> Iterator[str]:

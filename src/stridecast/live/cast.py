@@ -8,6 +8,7 @@ from pathlib import Path
 
 from stridecast.body.character import Character, character_of
 from stridecast.database.casting import cast_database
+from stridecast.formats.glb_bones import Bones, bones_of
 from stridecast.model.database import MotionDatabase
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
@@ -15,15 +16,21 @@ from stridecast.model.skeleton import Skeleton
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Costume:
-    """A character who moves as the people of one database do: ``file`` is where its skeleton and meshes are from."""
+    """A character who moves as the people of one database do.
+
+    Parameters
+    ----------
+    file
+        Where it is from.
+    character
+        Its skeleton and body.
+    bones
+        How the body poses the file, where that has meshes.
+    """
 
     file: Path
     character: Character
-
-    @property
-    def has_meshes(self) -> bool:
-        """Whether the file may hold meshes."""
-        return self.file.suffix.lower() == ".glb"
+    bones: Bones | None
 
 
 def cast(
@@ -44,11 +51,21 @@ def cast(
     ------
     SkeletonError
         A joint of hips or legs is missing.
+    FileError
+        Its meshes are such that they cannot be carried over (see ``GlbRig``).
     """
     character = character_of(skeleton, database.skeleton)
-    return cast_database(database, character.body, progress=progress), Costume(file=file, character=character)
+    bones = bones_of(file, character) if file.suffix.lower() == ".glb" else None
+    return cast_database(database, character.body, progress=progress), Costume(
+        file=file, character=character, bones=bones
+    )
 
 
 def worn(costume: Costume | None, motion: Motion) -> Motion:
     """A motion on the character's whole skeleton, if there is one."""
     return motion if costume is None else costume.character.played(motion)
+
+
+def meshes_of(costume: Costume | None) -> Path | None:
+    """The file whose meshes people have, if there is one."""
+    return None if costume is None or costume.bones is None else costume.file

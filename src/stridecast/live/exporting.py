@@ -14,10 +14,11 @@ from stridecast.crowd.crowd import Crowd
 from stridecast.errors import InputError
 from stridecast.formats.crowd_files import CrowdFiles
 from stridecast.formats.files import replacing
-from stridecast.formats.glb import GlbCrowd, Planted
+from stridecast.formats.glb import GlbCrowd
+from stridecast.formats.glb_figure import Planted
 from stridecast.formats.motion_files import write_motion
 from stridecast.formats.trace import trace_text
-from stridecast.live.cast import Costume, worn
+from stridecast.live.cast import Costume, meshes_of, worn
 from stridecast.live.frames import Figures, unpack_rotations
 from stridecast.model.motion import Motion
 from stridecast.synthesis.journey import Journey
@@ -107,7 +108,7 @@ def write_figures(
         Nothing has been played.
     """
     _check(frames)
-    scene = GlbCrowd(path)
+    scene = GlbCrowd(path, character=meshes_of(costume))
     try:
         motions = _motions(frames, crowd)
         for done, (start, motion) in enumerate(motions.values()):

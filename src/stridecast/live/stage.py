@@ -20,7 +20,7 @@ from stridecast.formats.store import load_database, save_database
 from stridecast.live import messages as say
 from stridecast.live.browsing import Browsing
 from stridecast.live.building import Building
-from stridecast.live.cast import Costume, cast
+from stridecast.live.cast import Costume, cast, meshes_of
 from stridecast.live.exporting import write_clip, write_figures, write_motions, write_walk, write_ways
 from stridecast.live.hall import Guest, Hall
 from stridecast.live.layout import CLAMPED
@@ -127,7 +127,7 @@ class Stage(threading.Thread):
         walking = Walking(database, tell)
         self.database, self.name, self.walking, self.costume = database, name, walking, costume
         self.guest.skeleton = database.skeleton
-        self.guest.character = costume.file if costume is not None and costume.has_meshes else None
+        self.guest.character = meshes_of(costume)
         self.scene = ScenePlay(
             database,
             tell,

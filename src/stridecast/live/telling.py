@@ -41,7 +41,18 @@ def skeleton_part(skeleton: Skeleton) -> SkeletonPart:
 
 def character_part(costume: Costume) -> CharacterPart | None:
     """The file of a character that has meshes, and how it is posed."""
-    return None
+    bones = costume.bones
+    if bones is None:
+        return None
+    return CharacterPart(
+        nodes=bones.nodes.tolist(),
+        before=[_four(turn) for turn in bones.before.tolist()],
+        after=[_four(turn) for turn in bones.after.tolist()],
+        corner=_three(bones.corner.tolist()),
+        turn=_four(bones.turn.tolist()),
+        grown=bones.grown,
+        size=bones.size,
+    )
 
 
 def database_part(database: MotionDatabase, name: str, built: bool) -> DatabasePart:
@@ -120,6 +131,11 @@ def _short(values: np.ndarray) -> list[float]:
 def _three(row: list[float]) -> tuple[float, float, float]:
     x, y, z = row
     return x, y, z
+
+
+def _four(row: list[float]) -> tuple[float, float, float, float]:
+    w, x, y, z = row
+    return w, x, y, z
 
 
 def _bounds(bounds: SteeringBounds) -> BoundsPart:
