@@ -1,8 +1,10 @@
 /** Skinned figures, cloned for those who are nearest: the mannequin that the server makes, or a character's meshes. */
 
 import {
+  Camera,
   Color,
   Group,
+  Light,
   type Material,
   Mesh,
   type MeshStandardMaterial,
@@ -62,10 +64,12 @@ export class Skin {
   /** Fetch the meshes of a character; an error where they are not what three reads. */
   static async wear(url: string, body: Body, most: number, character: CharacterPart): Promise<Skin> {
     const { scene, parser } = await new GLTFLoader().loadAsync(url);
-    for (const [object, where] of parser.associations) {
-      const node = (where as { nodes?: number } | undefined)?.nodes;
-      if (node !== undefined && "userData" in object) object.userData.node = node;
+    for (const number of character.nodes) {
+      if (number < 0) continue;
+      const node = (await parser.getDependency("node", number)) as Object3D; // the very object of the scene
+      node.userData.node = number;
     }
+    strip(scene, (await parser.getDependency("node", character.nodes[0]!)) as Object3D);
     let triangles = 0;
     scene.traverse((node) => {
       if (node instanceof Mesh) triangles += (node.geometry.index ?? node.geometry.attributes.position).count / 3;
@@ -188,6 +192,18 @@ export class Skin {
       return { node, before: quaternion(character.before[j]!), after: quaternion(character.after[j]!) };
     });
   }
+}
+
+/** Take away what is no part of a figure: lights, cameras, and meshes that neither hang from its root nor are skinned. */
+function strip(scene: Object3D, root: Object3D): void {
+  const inside = new Set<Object3D>();
+  root.traverse((node) => inside.add(node));
+  const away: Object3D[] = [];
+  scene.traverse((node) => {
+    const mesh = node instanceof Mesh && !(node instanceof SkinnedMesh) && !inside.has(node);
+    if (node instanceof Light || node instanceof Camera || mesh) away.push(node);
+  });
+  for (const node of away) node.removeFromParent();
 }
 
 function quaternion([w, x, y, z]: readonly number[]): Quaternion {
