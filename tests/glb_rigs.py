@@ -1,4 +1,4 @@
-"""Rigged GLB for tests, as artists' tools make them: joints at any angle, several skins, a hat, and much that is no figure."""
+"""Rigged GLB for tests, as artists make them: joints at any angle, several skins, a hat, and much that is no figure."""
 
 from __future__ import annotations
 
@@ -59,7 +59,9 @@ def numbers(values: np.ndarray) -> list[float]:
     return np.asarray(values, float).tolist()
 
 
-def artists_rig(path: Path, skeleton: Skeleton, *, seed: int = 0, unit: float = 1.0, armature: float = 1.0) -> None:
+def artists_rig(
+    path: Path, skeleton: Skeleton, *, seed: int = 0, unit: float = 1.0, armature: float = 1.0, picture: bool = True
+) -> None:
     """A figure that faces anywhere, in two skinned meshes of different spaces, with a hat on its head.
 
     Beside it are a camera, lights, a thing on the floor, a scene that is not shown, and an animation.
@@ -70,6 +72,8 @@ def artists_rig(path: Path, skeleton: Skeleton, *, seed: int = 0, unit: float = 
         Metres per unit of the file.
     armature
         Scale of the node above the joints.
+    picture
+        Whether there is a texture.
     """
     rng, parts = np.random.default_rng(seed), Parts()
     parts.document["asset"] = {"version": "2.0", "copyright": "Ann Artist"}
@@ -78,7 +82,7 @@ def artists_rig(path: Path, skeleton: Skeleton, *, seed: int = 0, unit: float = 
     rest = Rotation.random(skeleton.joints, random_state=rng)
     over = np.eye(4)
     over[:3, :3], over[:3, 3] = armature * Rotation.random(random_state=rng).as_matrix(), rng.normal(size=3) / unit
-    _materials(parts)
+    _materials(parts, picture)
 
     def local(above: np.ndarray, own: np.ndarray) -> dict[str, Any]:
         own = np.linalg.inv(above) @ own
@@ -105,14 +109,18 @@ def artists_rig(path: Path, skeleton: Skeleton, *, seed: int = 0, unit: float = 
     parts.write(path)
 
 
-def _materials(parts: Parts) -> None:
-    parts.add("images", bufferView=parts.view(PIXEL), mimeType="image/png")
-    parts.add("samplers", magFilter=9729)
-    parts.add("textures", source=0, sampler=0)
-    picture = {"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}
+def _materials(parts: Parts, picture: bool) -> None:
     shine = {"KHR_materials_ior": {"ior": 1.4}}
-    parts.add("materials", name="Coat", pbrMetallicRoughness={"baseColorTexture": picture}, extensions=shine)
-    parts.document["extensionsUsed"] = ["KHR_texture_transform", "KHR_materials_ior", "KHR_lights_punctual"]
+    coat: dict[str, Any] = {"name": "Coat", "extensions": shine, "pbrMetallicRoughness": {"metallicFactor": 0.0}}
+    if picture:
+        parts.add("images", bufferView=parts.view(PIXEL), mimeType="image/png")
+        parts.add("samplers", magFilter=9729)
+        parts.add("textures", source=0, sampler=0)
+        laid = {"index": 0, "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}
+        coat["pbrMetallicRoughness"]["baseColorTexture"] = laid
+    parts.add("materials", **coat)
+    used = ["KHR_texture_transform"] if picture else []
+    parts.document["extensionsUsed"] = [*used, "KHR_materials_ior", "KHR_lights_punctual"]
 
 
 def _skins(

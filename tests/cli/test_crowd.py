@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from stridecast.cli.main import app
 from stridecast.formats import crowd_files
-from stridecast.formats.crowd_files import CrowdFiles
+from stridecast.formats.crowd_bodies import BvhBodies
 from stridecast.formats.recordings import load_motion
 from stridecast.formats.store import save_database
 from stridecast.formats.trajectories import load_trajectories
@@ -168,9 +168,9 @@ def test_a_crowd_that_cannot_be_is_refused(scene, database, tmp_path):
 
 
 def test_names_of_files_are_safe_and_differ(tmp_path):
-    files = CrowdFiles(tmp_path / "out.bvh")
+    files = BvhBodies(tmp_path / "out.bvh")
     names = ("Ann", "ann", "a/b", "..", "people", "", "Ö", "x" * 300, "x" * 300, "ann.2", "con")
-    got = [files._place_of(k, name).name for k, name in enumerate(names)]
+    got = [files.place_of(k, name).name for k, name in enumerate(names)]
     assert len({name.casefold() for name in got}) == len(names)
     assert all(len(name) < 120 and "/" not in name and name.startswith("out.") for name in got)
 

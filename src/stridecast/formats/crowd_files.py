@@ -1,33 +1,25 @@
-"""Files of a crowd that are written while it walks: a table of everybody's places, and a BVH a person with an index."""
+"""Files of a crowd that are written while it walks: a table of everybody's places, and their motions beside it."""
 
 from __future__ import annotations
 
-import csv
-import io
-import re
-import time
-from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
-from itertools import count
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from stridecast.body.mannequin import mannequin
-from stridecast.errors import FileError
-from stridecast.formats.bvh import write_bvh
+from stridecast.errors import FileError, InputError
 from stridecast.formats.bvh_conventions import BvhConvention
+from stridecast.formats.crowd_bodies import BvhBodies, CrowdBodies, GlbBodies, UsdBodies, Walked
 from stridecast.formats.files import check_place
-from stridecast.formats.glb import GlbCrowd, check_compact
+from stridecast.formats.glb import check_compact
 from stridecast.formats.glb_figure import Planted
+from stridecast.formats.part_file import PartFile
 from stridecast.formats.trajectories import load_trajectories
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
 from stridecast.formats.usd import ENDINGS as USD
-from stridecast.formats.usd import UsdScene, check_usd
+from stridecast.formats.usd import check_usd
 from stridecast.geometry import ground
 from stridecast.model.motion import Motion
 from stridecast.model.scene import Scene
@@ -40,75 +32,8 @@ SCENES = (".glb", *USD)
 OUTPUTS = (".csv", ".parquet", ".bvh", *SCENES)
 """... and of all that a crowd is written as."""
 
-FLUSH = 1.0
-"""Rows reach the disk at least so often, seconds, ..."""
-
-FULL = 1 << 20
-"""... or when there are so many bytes."""
-
 ROW = "%d,%.9f,%.8f,%.8f,%.6f,%.6f\n"
 """Of places: fine enough for accelerations and their change to come out of them."""
-
-LONGEST_NAME = 80
-"""Characters of a person's name in the name of a file."""
-
-
-class PartFile:
-    """A table under a name of its own, ``x.part.csv``, which becomes ``x.csv`` at the end.
-
-    Whole rows are written at a time, so that it can be read whatever happens to the process.
-
-    Parameters
-    ----------
-    path
-        The table to be.
-    header
-        Names of the columns.
-
-    Raises
-    ------
-    FileError
-        The file system refuses.
-    """
-
-    def __init__(self, path: Path, header: str) -> None:
-        self.path = path
-        self.part, self._file = _open_beside(path)
-        self._rows = [header + "\n"]
-        self._size = len(header)
-        self._written = time.monotonic()
-        self.flush()
-
-    def add(self, rows: str) -> None:
-        """Take whole rows, each with its line end."""
-        self._rows.append(rows)
-        self._size += len(rows)
-        if self._size > FULL or time.monotonic() - self._written > FLUSH:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write all that there is."""
-        data = memoryview("".join(self._rows).encode())
-        try:
-            while data:
-                data = data[self._file.write(data) :]
-        except OSError as error:
-            raise FileError(f"cannot be written: {error.strerror or error}", path=self.part) from error
-        self._rows, self._size, self._written = [], 0, time.monotonic()
-
-    def close(self) -> None:
-        """Write the rest and leave the file under the name that it has."""
-        try:
-            self.flush()
-        finally:
-            self._file.close()
-
-    def rename(self) -> None:
-        """Put it where it belongs."""
-        try:
-            self.part.replace(self.path)
-        except OSError as error:
-            raise FileError(f"cannot be written: {error.strerror or error}", path=self.path) from error
 
 
 class CrowdFiles:
@@ -136,11 +61,14 @@ class CrowdFiles:
         Write a GLB with rotations of 16 bits (see ``write_glb``).
     convention
         How BVH is written (see ``write_bvh``).
+    character
+        The file that the skeletons of the motions are from; where both are GLB, everybody has its meshes (see
+        ``GlbCrowd``).
 
     Raises
     ------
     FileError
-        Another ending, or the file system refuses.
+        Another ending, a character that cannot be carried over, or the file system refuses.
     """
 
     def __init__(
@@ -150,27 +78,23 @@ class CrowdFiles:
         movers: int = 0,
         convention: str | BvhConvention = "plain",
         compact: bool = False,
+        character: str | Path | None = None,
     ) -> None:
         self.output = Path(output)
         kind = kind_of(self.output)
         check_compact(self.output, compact)
-        self.convention = convention
-        self.bodies = kind == ".bvh" or kind in SCENES
+        self._bodies = _bodies_of(self.output, kind, convention, compact, character)
+        self.bodies = self._bodies is not None
         self.table = self.output.with_suffix(".csv") if self.bodies else self.output
         self.movers = movers_of(self.output) if movers else None
-        self.index = self.output.with_suffix(".people.csv") if kind == ".bvh" else None
-        self._scene: UsdScene | GlbCrowd | None = None
-        self._in_scene = kind in SCENES
-        self._compact = compact
-        self.motions: list[Path] = []
         self.kept: list[Path] = []
-        self._names: set[str] = set()
         self._parts: list[PartFile] = []
 
     def __enter__(self) -> CrowdFiles:
         self._parts.append(PartFile(self.table, "id,time,x,y,heading,speed"))
-        if self.index is not None:
-            self._parts.append(PartFile(self.index, "id,name,start,seconds,frames,height,file"))
+        if self._bodies is not None:
+            self._bodies.begin()
+            self._parts += self._bodies.parts
         if self.movers is not None:
             self._parts.append(PartFile(self.movers, "id,time,x,y"))
         return self
@@ -185,12 +109,12 @@ class CrowdFiles:
                     part.close()
                 except FileError:  # the disk is full, say: what ended it all is more to the point
                     continue
-            self._keep_scene()
+            self.kept += [] if self._bodies is None else self._bodies.keep()
             return
         for part in self._parts:
             part.close()
-        if self._in_scene:
-            self._scene_of(30.0).save(self.output)
+        if self._bodies is not None:
+            self._bodies.save()
         for part in self._parts:
             if part.path.suffix.lower() == ".parquet":
                 csv_to_parquet(part.part, part.path)
@@ -199,28 +123,20 @@ class CrowdFiles:
                 part.rename()
             self.kept.remove(part.part)
 
-    def _keep_scene(self) -> None:
-        """Write who has left until now beside the scene that is not finished."""
-        if self._scene is None:
-            return
-        ending = self.output.suffix
-        names = (self.output.with_suffix(f".part{k if k > 1 else ''}{ending}") for k in count(1))
-        part = next(name for name in names if not name.exists())
-        with suppress(FileError):
-            self._scene.save(part)
-            self.kept.append(part)
+    @property
+    def index(self) -> Path | None:
+        """The table of who is who, if there is one."""
+        return None if self._bodies is None else self._bodies.index
 
-    def _scene_of(self, frame_rate: float) -> UsdScene | GlbCrowd:
-        """The scene, which is begun when there is somebody to be in it."""
-        if self._scene is None:
-            glb = self.output.suffix.lower() == ".glb"
-            self._scene = GlbCrowd(self.output, compact=self._compact) if glb else UsdScene(frame_rate)
-        return self._scene
+    @property
+    def motions(self) -> list[Path]:
+        """Files of single persons that have been written."""
+        return [] if self._bodies is None else self._bodies.motions
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Everything that is written, without the motions."""
-        scene = self.output if self._in_scene else None
+        scene = None if self._bodies is None else self._bodies.scene
         return tuple(path for path in (scene, self.table, self.index, self.movers) if path is not None)
 
     def add_rows(
@@ -265,27 +181,21 @@ class CrowdFiles:
         planted
             Which feet stand at which frame; a GLB tells it.
         """
-        if self._in_scene:
-            scene = self._scene_of(motion.frame_rate)
-            if isinstance(scene, GlbCrowd):
-                scene.add(motion, name=name, start=start, planted=planted)
-            else:
-                scene.add(motion, name=name, start=start, skin=mannequin)
-            return self.output
-        path = self._place_of(number, name)
-        write_bvh(path, motion, convention=self.convention)
-        self.motions.append(path)
-        row = (number, name, f"{start:.9f}", f"{motion.seconds:.9f}", motion.frames, f"{height:.3f}", path.name)
-        self._parts[1].add(_csv_row(row))
-        return path
+        if self._bodies is None:
+            raise InputError(f"a table has no bodies; name an output *.bvh, *.glb or *.usd instead of {self.output}")
+        return self._bodies.add(Walked(number, name, start, motion, height, planted))
 
-    def _place_of(self, number: int, name: str) -> Path:
-        """A name that every file system takes, and that nobody else has; small and capital letters are the same."""
-        safe = re.sub(r"[^\w-]+", "_", name, flags=re.ASCII).strip("_")[:LONGEST_NAME] or str(number)
-        words = (safe, f"{safe}.{number}", *(f"{safe}.{number}.{k}" for k in range(2, len(self._names) + 3)))
-        word = next(word for word in words if word.casefold() not in self._names)
-        self._names.add(word.casefold())
-        return self.output.with_suffix(f".{word}.bvh")
+
+def _bodies_of(
+    output: Path, kind: str, convention: str | BvhConvention, compact: bool, character: Path | str | None
+) -> CrowdBodies | None:
+    """What writes the motions of a crowd, if any are written."""
+    if kind == ".bvh":
+        return BvhBodies(output, convention)
+    if kind == ".glb":
+        own = None if character is None or Path(character).suffix.lower() != ".glb" else Path(character)
+        return GlbBodies(output, compact=compact, character=own)
+    return UsdBodies(output) if kind in USD else None
 
 
 def movers_of(path: Path) -> Path:
@@ -335,22 +245,3 @@ def kind_of(output: str | Path) -> str:
         check_usd(output)
     check_place(output)
     return kind
-
-
-def _open_beside(path: Path) -> tuple[Path, BinaryIO]:
-    """A new file beside another one; what is left of earlier ones stays."""
-    for k in count(1):
-        part = path.with_suffix(f".part{k if k > 1 else ''}.csv")
-        try:
-            return part, part.open("xb", buffering=0)
-        except FileExistsError:
-            continue
-        except OSError as error:
-            raise FileError(f"cannot be written: {error.strerror or error}", path=path) from error
-    raise AssertionError
-
-
-def _csv_row(row: Sequence[object]) -> str:
-    out = io.StringIO()
-    csv.writer(out, lineterminator="\n").writerow(row)
-    return out.getvalue()

@@ -160,7 +160,11 @@ class GlbCrowd:
         self._worn = RigFigure(character) if isinstance(character, (str, Path)) else character
         self._writer = GltfWriter(path)
         if self._worn is not None:
-            self._worn.rig.embed(self._writer)
+            try:
+                self._worn.rig.embed(self._writer)
+            except FileError:
+                self._writer.close()
+                raise
         self._keys = Keys(self._writer)
         self._figures: list[tuple[Skeleton, Figure]] = []
         self._roots: list[int] = []

@@ -163,6 +163,8 @@ def _check_whole(reader: GltfReader) -> None:
         uri = image.get("uri")
         if isinstance(uri, str) and not uri.startswith("data:"):
             reader.wrong(f"has the picture {uri!r} in another file, which is not opened; export it as one GLB")
+    for part in SHARED:
+        reader.objects(part)
     try:
         to_json(reader.document)
     except ValueError:
