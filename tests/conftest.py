@@ -90,6 +90,15 @@ def jupedsim() -> str:
 
 
 @pytest.fixture(scope="session")
+def vmcp() -> str:
+    """A Python that has vmcp, a receiver of the VMC protocol: ``STRIDECAST_VMCP``, or this one."""
+    named = os.environ.get("STRIDECAST_VMCP", "")
+    if not named and find_spec("vmcp") is None:
+        absent("vmcp", "no vmcp in this Python, and STRIDECAST_VMCP names no other")
+    return named or sys.executable
+
+
+@pytest.fixture(scope="session")
 def godot() -> str:
     """Godot 3 with its editor, without a window: ``STRIDECAST_GODOT``, or what is called godot3-server here."""
     found = os.environ.get("STRIDECAST_GODOT") or shutil.which("godot3-server")
