@@ -20,7 +20,6 @@ from stridecast.body.mannequin import mannequin
 from stridecast.model.skeleton import Skeleton
 
 SIDES = ("Left", "Right")
-ALL = slice(None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +64,8 @@ def export(path: Path, how: Export, body: Skeleton | None = None) -> Skeleton:
     body = body or humanoid()
     skin = mannequin(body, low=True)
     names, parents = [how.names(name) for name in body.names], body.parents.tolist()
-    at = (kinematics.rest(body).positions + [0.0, HIP_HEIGHT * body.leg_length / humanoid().leg_length, 0.0]).tolist()
+    floor = np.array([0.0, HIP_HEIGHT * body.leg_length / humanoid().leg_length, 0.0])
+    at = (kinematics.rest(body).positions + floor).tolist()
     if how.floor:
         parents[0] = len(names)
         names.append(how.floor)
@@ -106,7 +106,6 @@ def export(path: Path, how: Export, body: Skeleton | None = None) -> Skeleton:
     if how.above:
         nodes[len(how.above) - 1]["children"] = [index[joint] for joint in tops]
     pack = _Numbers()
-    floor = np.array([0.0, HIP_HEIGHT * body.leg_length / humanoid().leg_length, 0.0])
     vertices = how.facing.apply(skin.positions + floor) / how.unit
     grown = np.diag([how.unit, how.unit, how.unit, 1.0])
     document["skins"], document["meshes"] = [], []
