@@ -52,5 +52,5 @@ format: $(STAMP)
 	$(BIN)/python web/bundle.py format
 
 clean:
-	rm -rf .venv .venv-blender .venv-pedpy build dist demo web/node_modules tests/node/node_modules src/stridecast/live/static .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .benchmarks
+	rm -rf .venv .venv-blender .venv-pedpy .venv-jupedsim .venv-vmcp build dist demo web/node_modules tests/node/node_modules src/stridecast/live/static .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache .benchmarks
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

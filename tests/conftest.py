@@ -81,6 +81,33 @@ def pedpy() -> str:
 
 
 @pytest.fixture(scope="session")
+def jupedsim() -> str:
+    """A Python that has JuPedSim: ``STRIDECAST_JUPEDSIM``, or this one."""
+    named = os.environ.get("STRIDECAST_JUPEDSIM", "")
+    if not named and find_spec("jupedsim") is None:
+        absent("jupedsim", "no JuPedSim in this Python, and STRIDECAST_JUPEDSIM names no other")
+    return named or sys.executable
+
+
+@pytest.fixture(scope="session")
+def vmcp() -> str:
+    """A Python that has vmcp, a receiver of the VMC protocol: ``STRIDECAST_VMCP``, or this one."""
+    named = os.environ.get("STRIDECAST_VMCP", "")
+    if not named and find_spec("vmcp") is None:
+        absent("vmcp", "no vmcp in this Python, and STRIDECAST_VMCP names no other")
+    return named or sys.executable
+
+
+@pytest.fixture(scope="session")
+def godot() -> str:
+    """Godot 3 with its editor, without a window: ``STRIDECAST_GODOT``, or what is called godot3-server here."""
+    found = os.environ.get("STRIDECAST_GODOT") or shutil.which("godot3-server")
+    if not found:
+        absent("godot", "no godot3-server on this machine (STRIDECAST_GODOT names another Godot 3)")
+    return str(found)
+
+
+@pytest.fixture(scope="session")
 def chromium() -> Path:
     """The browser in which the page is tested: ``STRIDECAST_CHROMIUM``, or what is called chromium here."""
     named = os.environ.get("STRIDECAST_CHROMIUM")

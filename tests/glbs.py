@@ -30,6 +30,7 @@ class Glb:
         self.document: dict[str, Any] = json.loads(data[20 : 20 + length])
         at = 20 + length
         self.numbers = b""
+        self._arrays: dict[int, np.ndarray] = {}
         if at < total:
             size, kind = struct.unpack_from("<I4s", data, at)
             assert kind == b"BIN\0"
@@ -40,6 +41,11 @@ class Glb:
         return self.document.get(part, [])
 
     def array(self, index: int) -> np.ndarray:
+        if index not in self._arrays:
+            self._arrays[index] = self._read(index)
+        return self._arrays[index]
+
+    def _read(self, index: int) -> np.ndarray:
         accessor = self["accessors"][index]
         view = self["bufferViews"][accessor["bufferView"]]
         wide, kind = WIDE[accessor["type"]], TYPES[accessor["componentType"]]

@@ -6,6 +6,7 @@
     python fbx_to_glb.py walk.fbx walk.glb          # with a Python that has the package bpy
 
 The figure is the first armature of the file; BVH has the action that it plays. The result is in the file's frame rate.
+A character that does not move becomes a GLB for ``stridecast walk --skeleton``.
 """
 
 from __future__ import annotations
@@ -40,8 +41,13 @@ def convert(source: Path, target: Path) -> str:
     if not figures:
         raise SystemExit(f"{source}: it holds no skeleton")
     figure = figures[0]
+    scene, still = bpy.context.scene, figure.animation_data is None or figure.animation_data.action is None
+    if still:
+        if target.suffix.lower() != ".glb":
+            raise SystemExit("the skeleton does not move: it has no action; as a character write it to *.glb")
+        bpy.ops.export_scene.gltf(filepath=str(target), export_format="GLB", export_yup=True, export_animations=False)
+        return f"{target}: {figure.name} at rest"
     first, last = _range(figure)
-    scene = bpy.context.scene
     scene.frame_start, scene.frame_end = first, last
     if target.suffix.lower() == ".glb":
         bpy.ops.export_scene.gltf(filepath=str(target), export_format="GLB", export_yup=True)
@@ -54,10 +60,7 @@ def convert(source: Path, target: Path) -> str:
 
 def _range(figure: bpy.types.Object) -> tuple[int, int]:
     """First and last frame of what the figure plays."""
-    animation = figure.animation_data
-    if animation is None or animation.action is None:
-        raise SystemExit("the skeleton does not move: it has no action")
-    first, last = animation.action.frame_range
+    first, last = figure.animation_data.action.frame_range
     return int(first), max(round(last), int(first) + 1)
 
 

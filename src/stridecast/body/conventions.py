@@ -147,7 +147,7 @@ def _body(
     recording: RawRecording, mapping: Mapping[str, str] | None, notes: list[str]
 ) -> tuple[RawRecording, Skeleton]:
     """Joints with their roles, still in the file's unit and axes."""
-    roles = find_roles(recording.names, recording.parents.tolist(), mapping)
+    roles = find_roles(recording.names, recording.parents.tolist(), {**recording.roles, **(mapping or {})})
     recording, roles = rooted_at_hips(recording, roles, notes)
     recording, roles = with_toes(recording, roles, notes)
     skeleton = body_of(recording, roles)

@@ -34,6 +34,8 @@ class RawRecording:
         Metres per unit, if the file says.
     notes
         What the reader had to guess or leave out, one sentence each.
+    roles
+        Joints whose role the file tells, role to name; what else there is is found by names.
     """
 
     names: tuple[str, ...]
@@ -47,6 +49,7 @@ class RawRecording:
     frame_rate: float | None = None
     unit: float | None = None
     notes: tuple[str, ...] = ()
+    roles: Mapping[str, str] = field(default_factory=dict)
 
 
 def body_of(recording: RawRecording, roles: Mapping[str, int]) -> Skeleton:

@@ -49,16 +49,16 @@ FAMILIES: Mapping[str, Limbs] = {
         "forearm": ("{l}radius",),
         "hand": ("{l}wrist",),
     },
-    # Bandai-Namco, Unity and VRM humanoids, Xsens' own words
+    # Bandai-Namco, Unity and VRM humanoids, VRoid (J_Bip_L_UpperLeg), Xsens' own words
     "upper and lower": {
-        "thigh": ("UpperLeg_{L}", "{Left}UpperLeg"),
-        "shin": ("LowerLeg_{L}", "{Left}LowerLeg"),
-        "foot": ("Foot_{L}", "{Left}Foot"),
-        "toe": ("Toes_{L}", "{Left}Toes", "{Left}Toe"),
-        "shoulder": ("Shoulder_{L}", "{Left}Shoulder"),
-        "upper_arm": ("UpperArm_{L}", "{Left}UpperArm"),
-        "forearm": ("LowerArm_{L}", "{Left}LowerArm", "{Left}ForeArm"),
-        "hand": ("Hand_{L}", "{Left}Hand"),
+        "thigh": ("UpperLeg_{L}", "{L}_UpperLeg", "{Left}UpperLeg"),
+        "shin": ("LowerLeg_{L}", "{L}_LowerLeg", "{Left}LowerLeg"),
+        "foot": ("Foot_{L}", "{L}_Foot", "{Left}Foot"),
+        "toe": ("Toes_{L}", "{L}_ToeBase", "{Left}Toes", "{Left}Toe"),
+        "shoulder": ("Shoulder_{L}", "{L}_Shoulder", "{Left}Shoulder"),
+        "upper_arm": ("UpperArm_{L}", "{L}_UpperArm", "{Left}UpperArm"),
+        "forearm": ("LowerArm_{L}", "{L}_LowerArm", "{Left}LowerArm", "{Left}ForeArm"),
+        "hand": ("Hand_{L}", "{L}_Hand", "{Left}Hand"),
     },
     # the first BVH files there were
     "classic": {
@@ -116,6 +116,12 @@ FAMILIES: Mapping[str, Limbs] = {
 }
 """Families of skeletons and what they call the joints of limbs; ``{Left}``, ``{L}`` and ``{l}`` stand for the side."""
 
+HEADS = ("head", "spine006")
+"""What heads are called; the second is Rigify's."""
+
+_PREFIX = re.compile(r"^(J_Bip_C_|J_Bip_|DEF-)")
+"""What VRoid and Rigify write before the names of a body's joints, and not before those of hair, cloth and controls."""
+
 _SIDES = (("left", {"Left": "Left", "L": "L", "l": "l"}), ("right", {"Left": "Right", "L": "R", "l": "r"}))
 
 
@@ -172,8 +178,8 @@ def _limbs(names: Sequence[str]) -> dict[str, int]:
 
 
 def _plain(names: Sequence[str]) -> list[str]:
-    """Strip namespaces (``mixamorig:``), what nearly all begin with (``Bip01 ``), case and marks."""
-    bare = [name.rpartition(":")[2] for name in names]
+    """Strip namespaces (``mixamorig:``), what bodies or nearly all begin with (``Bip01 ``), case and marks."""
+    bare = [_PREFIX.sub("", name.rpartition(":")[2]) for name in names]
     middle = sorted(bare)[len(bare) // 2] if bare else ""
     starts = [middle[: mark.end()] for mark in re.finditer(r"[\s_.-]", middle)]
     shared = [start for start in starts if sum(name.startswith(start) for name in bare) > 0.75 * len(bare)]
@@ -186,7 +192,7 @@ def _squeeze(name: str) -> str:
 
 def _trunk(names: Sequence[str], parents: Sequence[int], roles: Mapping[str, int]) -> dict[str, int]:
     """Hips, spine, chest, neck and head, from where the limbs hang and which joint is called head."""
-    head = roles.get("head", next((j for j, name in enumerate(_plain(names)) if name == "head"), None))
+    head = roles.get("head", _head(names))
     arms = [roles[f"{side}_{part}"] for side in ("left", "right") for part in ARMS[:2] if f"{side}_{part}" in roles]
     thighs = [roles[role] for role in ("left_thigh", "right_thigh") if role in roles]
     upper = [joint for joint in (head, *arms) if joint is not None]
@@ -210,6 +216,11 @@ def _trunk(names: Sequence[str], parents: Sequence[int], roles: Mapping[str, int
     if trunk.get("chest") == trunk["hips"]:
         del trunk["chest"]
     return trunk
+
+
+def _head(names: Sequence[str]) -> int | None:
+    plain = _plain(names)
+    return next((plain.index(word) for word in HEADS if word in plain), None)
 
 
 def _line(parents: Sequence[int], joint: int) -> list[int]:

@@ -16,6 +16,7 @@ from stridecast.formats.files import check_place
 from stridecast.formats.glb import check_compact
 from stridecast.formats.glb_figure import Planted
 from stridecast.formats.part_file import PartFile
+from stridecast.formats.recordings import GLB
 from stridecast.formats.trajectories import load_trajectories
 from stridecast.formats.trajectory_tables import check_parquet, csv_to_parquet
 from stridecast.formats.usd import ENDINGS as USD
@@ -193,7 +194,7 @@ def _bodies_of(
     if kind == ".bvh":
         return BvhBodies(output, convention)
     if kind == ".glb":
-        own = None if character is None or Path(character).suffix.lower() != ".glb" else Path(character)
+        own = None if character is None or Path(character).suffix.lower() not in GLB else Path(character)
         return GlbBodies(output, compact=compact, character=own)
     return UsdBodies(output) if kind in USD else None
 

@@ -1,4 +1,4 @@
-"""Recordings from GLB: the first animation of the first skinned figure, or of what moves where nothing has a skin.
+"""Recordings from GLB: the first animation of a skinned figure, or of what moves where nothing has a skin.
 
 Joints may rest at any angle in a file. Here all frames agree at rest, so rotations are told against the bind pose (that
 of the nodes where there is no skin): ``G_parent r G^-1`` for a local rotation ``r`` and rest orientations ``G``.
@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from stridecast.body.rig import RawRecording
 from stridecast.errors import FileError
 from stridecast.formats.gltf_reading import GltfReader
+from stridecast.formats.vrm import vrm_roles
 from stridecast.geometry import quaternions as quat
 
 Array = np.ndarray
@@ -25,8 +26,14 @@ MOST_JOINTS = 1024
 MOST_FRAMES, MOST_POSES = 1 << 18, 1 << 24
 """Of what is read at most; poses are frames times joints."""
 
+MOST_WALKED = 1 << 22
+"""Joints of all skins, and nodes over them, that are looked at at most."""
+
 RATES = (1.0, 1000.0)
 """Frames a second that are believed."""
+
+BOUND = 0.02
+"""Nodes that are turned against the bind pose by this, all by the same, stand in it, radians."""
 
 SLIDES = 1e-5
 """A joint that moves against its parent by less stays in its place, metres."""
@@ -55,7 +62,9 @@ def read_glb(path: str | Path) -> RawRecording:
 
 
 def read_glb_at_rest(path: str | Path) -> RawRecording:
-    """Read the skeleton of a GLB, one frame at rest: of its first skin, else of what its first animation turns.
+    """Read the skeleton of a GLB, one frame at rest: of its skins, else of what its first animation turns.
+
+    Where there are several figures it is that with most joints.
 
     Raises
     ------
@@ -73,6 +82,14 @@ class _Track(NamedTuple):
     times: Float[Array, "keys"]
     values: Float[Array, "keys components"]
     mode: str
+
+
+class _Figure(NamedTuple):
+    """Skins that move one body: their numbers, all their joints in order, and these with all nodes over them."""
+
+    skins: tuple[int, ...]
+    joints: dict[int, None]
+    over: set[int]
 
 
 class Rest(NamedTuple):
@@ -103,6 +120,7 @@ class GlbFigure:
         self.reader = reader
         self.nodes = reader.objects("nodes")
         self.notes: list[str] = []
+        self._walked = 0
         self.tracks: dict[tuple[int, str], _Track] = {}
         self.told: Mapping[str, Any] = {}
         if not (still and reader.objects("skins")):
@@ -145,9 +163,9 @@ class GlbFigure:
             if np.abs(place - place[0]).max() > SLIDES:
                 slides[k] = place
             sizes.append(sizes[parent] * self._scale(node))
-        ends = self._ends(index)
+        ends, names = self._ends(index), self._names()
         return RawRecording(
-            names=self._names(),
+            names=names,
             parents=np.array(parents),
             offsets=np.array(offsets),
             end_joints=np.array([joint for joint, _ in ends], np.int64),
@@ -158,6 +176,7 @@ class GlbFigure:
             frame_rate=self.rate,
             unit=1.0,
             notes=tuple(self.notes),
+            roles={role: names[index[node]] for role, node in vrm_roles(r).items() if node in index},
         )
 
     def at_rest(self) -> Rest:
@@ -249,46 +268,82 @@ class GlbFigure:
         return _Track(times, values, mode)
 
     def _joints(self) -> tuple[list[int], dict[int, Float[Array, "4"]]]:
-        """Nodes that are joints, parents first, and how those of a skin are turned in its bind pose."""
-        r = self.reader
+        """Nodes that are joints, parents first, and how those of skins are turned in their bind pose."""
         moving = {node for node, _ in self.tracks}
+        figures = self._figures()
+        shown = [figure for figure in figures if not (moving and moving.isdisjoint(figure.joints))]
+        if not shown:
+            return self._tree(sorted(node for node, path in self.tracks if path == "rotation")), {}
+        figure = max(shown, key=lambda one: len(one.joints))  # the first of equals
+        if len(figures) > 1:
+            self.notes.append(f"of {len(figures)} skinned figures number {figures.index(figure) + 1} is read")
         binds: dict[int, Array] = {}
-        listed: list[int] = []
-        skins = r.objects("skins")
-        for k, skin in enumerate(skins):
+        for number in figure.skins:
+            own = self._bound(self.reader.objects("skins")[number], number)
+            binds = (self._in_place(own, binds) if own else {}) | binds
+        return self._tree(list(figure.joints)), binds
+
+    def _figures(self) -> list[_Figure]:
+        """Skins that share joints, or hang from one another's: a body often has one for each of its meshes."""
+        r = self.reader
+        figures: dict[int, _Figure] = {}
+        owner: dict[int, int] = {}
+        hanging: dict[int, set[int]] = {}
+        for k, skin in enumerate(r.objects("skins")):
             found = skin.get("joints", [])
             if not isinstance(found, list) or not found:
                 r.wrong(f"skin {k} must have a list of joints")
             for joint in found:
                 r.one("nodes", joint, f"skin {k}")
-        moved = [k for k, skin in enumerate(skins) if not (moving and moving.isdisjoint(skin["joints"]))]
-        if moved:  # the skin of eyes or of a shirt, say, has few of the joints
-            first = max(moved, key=lambda k: len(set(skins[k]["joints"])))
-            listed, binds = list(dict.fromkeys(skins[first]["joints"])), self._bound(skins[first], first)
-            same = [k for k in moved if k != first and not set(listed).isdisjoint(skins[k]["joints"])]
-            for k in same:
-                self._join(skins[k], k, listed, binds)
-            if len(same) + 1 < len(skins):
-                self.notes.append(f"of {len(skins)} skinned figures number {first + 1} is read")
-        if not listed:
-            listed = sorted(node for node, path in self.tracks if path == "rotation")
-        tree = self._tree(listed)
-        if len(tree) > MOST_JOINTS:
-            r.wrong(f"has a skeleton of {len(tree)} joints; at most {MOST_JOINTS} are read")
-        return tree, binds
+            over = self._all_over(found)
+            same = {owner[node] for node in over if node in owner}.union(*(hanging.get(joint, ()) for joint in found))
+            parts = [figures.pop(number) for number in sorted(same)]
+            parts = sorted([*parts, _Figure((k,), dict.fromkeys(found), over)], key=lambda one: -len(one.joints))
+            first = min(number for one in parts for number in one.skins)
+            figures[first] = _Figure(
+                tuple(number for one in parts for number in one.skins),
+                dict.fromkeys(joint for one in parts for joint in one.joints),
+                self._counted({node for one in parts for node in one.over}),
+            )
+            owner |= dict.fromkeys(figures[first].joints, first)
+            for node in figures[first].over:
+                hanging[node] = (hanging.get(node, set()) - same) | {first}
+        return [figures[number] for number in sorted(figures)]
 
-    def _join(self, skin: Mapping[str, Any], number: int, listed: list[int], binds: dict[int, Array]) -> None:
-        """Add the joints of another skin of the same figure, whose bind pose may be turned as a whole."""
-        known = set(listed)
-        new = [joint for joint in dict.fromkeys(skin["joints"]) if joint not in known]
-        if not new:
-            return
-        own = self._bound(skin, number)
-        shared = next((joint for joint in own if joint in binds), None)
-        if shared is not None:
-            turn = quat.multiply(binds[shared], quat.inverse(own[shared]))
-            binds.update({joint: quat.multiply(turn, own[joint]) for joint in new})
-        listed += new
+    def _all_over(self, joints: list[int]) -> set[int]:
+        """Joints with all nodes over them."""
+        known = set(joints)
+        for joint in joints:
+            node = int(self.reader.parents[joint])
+            while node >= 0 and node not in known:
+                known.add(node)
+                node = int(self.reader.parents[node])
+        return self._counted(known)
+
+    def _counted(self, nodes: set[int]) -> set[int]:
+        """The nodes, unless too many were looked at by now."""
+        self._walked += len(nodes)
+        if self._walked > MOST_WALKED:
+            self.reader.wrong(f"has skins with more than {MOST_WALKED} joints and nodes over them")
+        return nodes
+
+    def _in_place(self, own: dict[int, Array], known: Mapping[int, Array]) -> dict[int, Array]:
+        """Joints of a skin in its bind pose, turned as a whole to where the file shows them.
+
+        A skin has a space of its own. Where nodes stand in the bind pose they tell how it is turned; else joints do
+        that another skin has too, and where there are none it is believed to be that of the world.
+        """
+        joints = list(own)
+        shown = np.array([quat.multiply(self.over(node)[1], self._rest(node)) for node in joints])
+        turns = quat.multiply(shown, quat.inverse(np.array([own[node] for node in joints])))
+        turn = quat.mean(turns)
+        away = np.linalg.norm(quat.log(quat.multiply(quat.inverse(turn), turns)), axis=-1)
+        if away.max() > BOUND:
+            shared = next((node for node in joints if node in known), None)
+            turn = quat.IDENTITY
+            if shared is not None:
+                turn = quat.multiply(known[shared], quat.inverse(own[shared]))
+        return {node: quat.multiply(turn, rotation) for node, rotation in own.items()}
 
     def _tree(self, listed: list[int]) -> list[int]:
         """The joints that hang from the one with most of them, with the nodes that are between."""
@@ -303,6 +358,7 @@ class GlbFigure:
             top = max(k for k, node in enumerate(line) if node in wanted)
             lines[joint] = line[: top + 1]
             count[line[top]] = count.get(line[top], 0) + 1
+        self._check_rigify(lines)
         root = max(count, key=lambda node: count[node])
         kept = [joint for joint in listed if lines[joint][-1] == root]
         if len(kept) < len(listed):
@@ -313,7 +369,19 @@ class GlbFigure:
                 if node not in inside:
                     inside.add(node)
                     ordered.append(node)
+        if len(ordered) > MOST_JOINTS:
+            self.reader.wrong(f"has a skeleton of {len(ordered)} joints; at most {MOST_JOINTS} are read")
         return ordered
+
+    def _check_rigify(self, lines: Mapping[int, list[int]]) -> None:
+        """Refuse a control rig of Rigify: what deforms the body hangs in pieces there, held together by Blender."""
+        hang = {str(self.nodes[joint].get("name")): line[-1] for joint, line in lines.items()}
+        spine, thigh = (hang.get(f"DEF-{name}") for name in ("spine", "thigh.L"))
+        if spine is not None and thigh is not None and spine != thigh:
+            self.reader.wrong(
+                "is a control rig of Rigify: its bones DEF-spine and DEF-thigh.L do not hang together, so only Blender "
+                "can move it; give the DEF- bones each other as parents and export only them (docs/character.md)"
+            )
 
     def _bound(self, skin: Mapping[str, Any], number: int) -> dict[int, Float[Array, "4"]]:
         """How the joints of a skin are turned in its bind pose."""

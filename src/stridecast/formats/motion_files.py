@@ -12,6 +12,7 @@ from stridecast.formats.files import check_place
 from stridecast.formats.glb import check_compact, write_glb
 from stridecast.formats.glb_character import write_character
 from stridecast.formats.glb_figure import Planted
+from stridecast.formats.recordings import GLB
 from stridecast.formats.usd import ENDINGS as USD
 from stridecast.formats.usd import check_usd, write_usd
 from stridecast.model.motion import Motion
@@ -68,7 +69,7 @@ def write_motion(
     ending = Path(path).suffix.lower()
     if ending in USD:
         write_usd(path, motion, skin=mannequin)
-    elif ending == ".glb" and character is not None and Path(character).suffix.lower() == ".glb":
+    elif ending == ".glb" and character is not None and Path(character).suffix.lower() in GLB:
         write_character(path, motion, character, compact=compact, planted=planted)
     elif ending == ".glb":
         write_glb(path, motion, planted=planted, compact=compact)

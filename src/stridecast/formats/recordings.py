@@ -27,11 +27,16 @@ RECORDINGS = {
     ".npz": "AMASS and other SMPL motion",
     ".c3d": "C3D",
     ".glb": "GLB",
+    ".vrma": "VRM animation",
 }
 """Suffixes of the recordings that ``load_motion`` reads, and what they are."""
 
-SKELETONS = {".bvh": "BVH", ".asf": "ASF", ".glb": "GLB"}
+SKELETONS = {".bvh": "BVH", ".asf": "ASF", ".glb": "GLB", ".vrm": "VRM"}
 """Suffixes of the files that ``load_skeleton`` reads, and what they are."""
+
+
+GLB = (".glb", ".vrm", ".vrma")
+"""Suffixes of files that are GLB."""
 
 
 def load_motion(
@@ -50,7 +55,7 @@ def load_motion(
     Parameters
     ----------
     path
-        A BVH, AMC, GLB, AMASS (``.npz``) or C3D file, known by its suffix, else by its first words.
+        A BVH, AMC, GLB, VRM animation, AMASS (``.npz``) or C3D file, known by its suffix, else by its first words.
     roles
         Joints of the body whose names are unusual, role to joint name; the others are found by their names.
     scale
@@ -136,12 +141,12 @@ def load_recording(
 
 
 def load_skeleton(path: str | Path, *, roles: Mapping[str, str] | None = None, scale: float | None = None) -> Skeleton:
-    """Load only the skeleton of a BVH, ASF or GLB file; parameters and errors as of ``load_motion``."""
+    """Load only the skeleton of a BVH, ASF, GLB or VRM file; parameters and errors as of ``load_motion``."""
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in SKELETONS:
         raise FileError(f"is no skeleton that can be read; readable are {_listed(SKELETONS)}", path=path)
-    if suffix == ".glb":
+    if suffix in GLB:
         recording = read_glb_at_rest(path)
     else:
         recording = read_bvh(path) if suffix == ".bvh" else read_asf(path).at_rest()
@@ -164,7 +169,7 @@ def _read(
     if suffix == ".npz":
         return read_amass(path, body_model=body_model)
     seems = looks_like(read_start(path)) if suffix not in RECORDINGS else ""
-    if suffix == ".glb" or "GLB" in seems:
+    if suffix in GLB or "GLB" in seems:
         return read_glb(path)
     if suffix == ".bvh" or "BVH" in seems:
         return read_bvh(path)

@@ -9,6 +9,7 @@ from pathlib import Path
 from stridecast.body.character import Character, character_of
 from stridecast.database.casting import cast_database
 from stridecast.formats.glb_bones import Bones, bones_of
+from stridecast.formats.recordings import GLB
 from stridecast.model.database import MotionDatabase
 from stridecast.model.motion import Motion
 from stridecast.model.skeleton import Skeleton
@@ -55,7 +56,7 @@ def cast(
         Its meshes are such that they cannot be carried over (see ``GlbRig``).
     """
     character = character_of(skeleton, database.skeleton)
-    bones = bones_of(file, character) if file.suffix.lower() == ".glb" else None
+    bones = bones_of(file, character) if file.suffix.lower() in GLB else None
     return cast_database(database, character.body, progress=progress), Costume(
         file=file, character=character, bones=bones
     )

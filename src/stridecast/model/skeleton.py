@@ -27,6 +27,9 @@ ROLES = TRUNK + tuple(f"{side}_{part}" for side in ("left", "right") for part in
 REQUIRED_ROLES = ("hips", *(f"{side}_{part}" for side in ("left", "right") for part in LEGS))
 """Roles without which there is no locomotion to learn."""
 
+MOST_LISTED = 80
+"""So many joints are listed where none is found for a role; control rigs have many hundreds."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Skeleton:
@@ -130,8 +133,9 @@ class Skeleton:
         """Raise a ``SkeletonError`` that names every role in ``roles`` that no joint has."""
         missing = [role for role in roles if role not in self.roles]
         if missing:
+            more = f" and {self.joints - MOST_LISTED} more" if self.joints > MOST_LISTED else ""
             raise SkeletonError(
-                f"no joint found for {', '.join(missing)}; joints are {', '.join(self.names)}. "
+                f"no joint found for {', '.join(missing)}; joints are {', '.join(self.names[:MOST_LISTED])}{more}. "
                 "Name them in a mapping from role to joint"
             )
 
