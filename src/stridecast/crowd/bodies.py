@@ -172,7 +172,9 @@ def stature(skeleton: Skeleton) -> float:
 
 def scaled_to(skeleton: Skeleton, height: float | None) -> Skeleton:
     """A skeleton of another height, metres; as it is where nothing is said."""
-    if height is None:
-        return skeleton
-    scale = height / stature(skeleton)
-    return replace(skeleton, offsets=scale * skeleton.offsets, end_offsets=scale * skeleton.end_offsets)
+    return skeleton if height is None else scaled(skeleton, height / stature(skeleton))
+
+
+def scaled(skeleton: Skeleton, size: float) -> Skeleton:
+    """A skeleton so many times as large."""
+    return replace(skeleton, offsets=size * skeleton.offsets, end_offsets=size * skeleton.end_offsets)
