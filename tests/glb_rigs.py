@@ -141,7 +141,7 @@ def _skins(
         chosen = body.triangles[np.isin(body.joints[body.triangles[:, 0], 0], legs) == (name == "Legs")]
         used = np.unique(chosen)
         influences, weights = body.joints[used], body.weights[used]
-        turn = Rotation.random(random_state=rng)
+        turn = facing * Rotation.create_group("O")[int(rng.integers(24))]  # any axis of a mesh may be up
         space = np.eye(4)  # from the mesh to the world at rest
         space[:3, :3], space[:3, 3] = 0.5 * turn.as_matrix(), rng.normal(size=3) / unit
         there = facing.apply(body.positions[used]) / unit + [0.0, 1.0 / unit, 0.0]
@@ -164,7 +164,7 @@ def _skins(
             places,
             np.searchsorted(used, chosen),
             turn.inv().apply(facing.apply(body.normals[used])),
-            TEXCOORD_0=parts.put(rng.uniform(size=(len(places), 2)), "VEC2"),
+            TEXCOORD_0=parts.put(body.positions[used, :2], "VEC2"),
             JOINTS_0=parts.put(np.where(weights > 0, slots[influences], 0), "VEC4", "<u1"),
             WEIGHTS_0=parts.put(weights, "VEC4"),
         )

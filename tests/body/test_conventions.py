@@ -200,6 +200,15 @@ def test_an_unknown_unit_makes_an_adult():
     assert any("no known unit" in note for note in notes)
 
 
+@pytest.mark.parametrize("unit", [0.01, 0.001])
+def test_a_stated_unit_that_makes_giants_is_not_believed(unit):
+    recording = replace(recorded(standing(), unit=unit), unit=1.0)
+    motion, notes = to_motion(recording)
+    np.testing.assert_allclose(places(motion), places(standing()), atol=1e-9)
+    assert any("that the file states" in note for note in notes)
+    assert to_motion(recording, scale=1.0)[0].skeleton.leg_length == pytest.approx(humanoid().leg_length / unit)
+
+
 def test_up_may_be_said():
     original = standing()
     lying = recorded(original, world=quat.exp(np.array([np.pi / 2, 0.0, 0.0])))

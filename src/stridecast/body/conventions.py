@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from stridecast.body import kinematics
+from stridecast.body.character import resized
 from stridecast.body.rig import RawRecording, body_of, rooted_at_hips, with_toes
 from stridecast.body.roles import find_roles
 from stridecast.errors import InputError, MotionError, SkeletonError
@@ -108,7 +109,7 @@ def to_motion(
     unit = _unit(skeleton, recording.unit, scale, notes)
     _check_slides(recording, skeleton, unit, before, notes)
     motion = Motion(
-        skeleton=_scaled(skeleton, unit),
+        skeleton=resized(skeleton, unit),
         frame_rate=_frame_rate(recording.frame_rate, frame_rate, notes),
         root_positions=recording.root_positions * unit,
         rotations=quat.continuous(quat.normalize(recording.rotations)),
@@ -131,7 +132,7 @@ def to_skeleton(
     """Bring only the skeleton of a recording into the conventions; parameters and errors as of ``to_motion``."""
     notes = list(recording.notes)
     recording, skeleton = _body(recording, roles, notes)
-    skeleton = _scaled(skeleton, _unit(skeleton, recording.unit, scale, notes))
+    skeleton = resized(skeleton, _unit(skeleton, recording.unit, scale, notes))
     return _skeleton_rested(skeleton, _rest_turn(skeleton, notes)), tuple(notes)
 
 
@@ -177,10 +178,6 @@ def _unit(skeleton: Skeleton, stated: float | None, scale: float | None, notes: 
     unit = sum(ADULT_LEG) / 2 / leg
     notes.append(f"lengths are in no known unit; {unit:.4g} m per unit makes the leg {unit * leg:.2f} m long")
     return unit
-
-
-def _scaled(skeleton: Skeleton, unit: float) -> Skeleton:
-    return replace(skeleton, offsets=skeleton.offsets * unit, end_offsets=skeleton.end_offsets * unit)
 
 
 def _frame_rate(stated: float | None, given: float | None, notes: list[str]) -> float:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -21,61 +25,79 @@ CharacterOption = Annotated[
         "--skeleton", metavar="CHARACTER.bvh|.glb", help="Play it on this character's skeleton; else on the database's."
     ),
 ]
-BvhFor = Annotated[
-    str | None,
-    typer.Option("--bvh-for", metavar="blender|motionbuilder|unreal", help="Write BVH as this program expects it."),
-]
-BvhUnit = Annotated[
-    str | None, typer.Option("--bvh-unit", metavar="m|cm|mm|METRES", help="Unit of length; else the program's, or m.")
-]
-BvhOrder = Annotated[
-    str | None, typer.Option("--bvh-order", metavar="ZYX", help="Order of rotation channels; else ZYX.")
-]
-BvhUp = Annotated[str | None, typer.Option("--bvh-up", metavar="Y|Z", help="Axis that points up; else Y.")]
-BvhRoot = Annotated[
-    str | None,
-    typer.Option(
-        "--bvh-root", metavar="zero|standing|ground", help="OFFSET of the root, or a joint on the floor below it."
-    ),
-]
-BvhRest = Annotated[
-    bool | None, typer.Option("--bvh-rest/--no-bvh-rest", help="Begin with a frame in the rest pose, or not.")
+CompactOption = Annotated[
+    bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
 ]
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 
-def bvh_written(
-    output: Path | None,
-    program: str | None,
-    unit: str | None,
-    order: str | None,
-    up: str | None,
-    root: str | None,
-    rest: bool | None,
-) -> BvhConvention:
-    """How BVH is to be written.
+@dataclass(frozen=True, kw_only=True)
+class BvhOptions:
+    """How BVH is to be written; each field is an option of a command ``with_bvh_options``."""
 
-    Raises
-    ------
-    InputError
-        Options that are none, or no BVH is written.
-    """
-    from stridecast.errors import InputError
-    from stridecast.formats.bvh_conventions import bvh_convention
+    bvh_for: Annotated[
+        str | None,
+        typer.Option("--bvh-for", metavar="blender|motionbuilder|unreal", help="Write BVH as this program expects it."),
+    ] = None
+    bvh_unit: Annotated[
+        str | None,
+        typer.Option("--bvh-unit", metavar="m|cm|mm|METRES", help="Unit of length; else the program's, or m."),
+    ] = None
+    bvh_order: Annotated[
+        str | None, typer.Option("--bvh-order", metavar="ZYX", help="Order of rotation channels; else ZYX.")
+    ] = None
+    bvh_up: Annotated[str | None, typer.Option("--bvh-up", metavar="Y|Z", help="Axis that points up; else Y.")] = None
+    bvh_root: Annotated[
+        str | None,
+        typer.Option(
+            "--bvh-root", metavar="zero|standing|ground", help="OFFSET of the root, or a joint on the floor below it."
+        ),
+    ] = None
+    bvh_rest: Annotated[
+        bool | None, typer.Option("--bvh-rest/--no-bvh-rest", help="Begin with a frame in the rest pose, or not.")
+    ] = None
 
-    given = {"for": program, "unit": unit, "order": order, "up": up, "root": root, "rest": rest}
-    named = [f"--bvh-{name}" for name, value in given.items() if value is not None]
-    if named and (output is None or output.suffix.lower() != ".bvh"):
-        raise InputError(f"{named[0]} goes with an output *.bvh")
-    return bvh_convention(
-        program or "plain",
-        order=order,
-        scale=None if unit is None else _metres(unit),
-        up=up,
-        root=root,
-        rest_frame=rest,
-    )
+    def convention(self, output: Path | None) -> BvhConvention:
+        """The same for a file.
+
+        Raises
+        ------
+        InputError
+            Options that are none, or no BVH is written.
+        """
+        from stridecast.errors import InputError
+        from stridecast.formats.bvh_conventions import bvh_convention
+
+        named = [f"--{name.replace('_', '-')}" for name, value in vars(self).items() if value is not None]
+        if named and (output is None or output.suffix.lower() != ".bvh"):
+            raise InputError(f"{named[0]} goes with an output *.bvh")
+        return bvh_convention(
+            self.bvh_for or "plain",
+            order=self.bvh_order,
+            scale=None if self.bvh_unit is None else _metres(self.bvh_unit),
+            up=self.bvh_up,
+            root=self.bvh_root,
+            rest_frame=self.bvh_rest,
+        )
+
+
+def with_bvh_options(command: Callable[..., None]) -> Callable[..., None]:
+    """A command whose parameter ``bvh`` is made of an option for each field of ``BvhOptions``."""
+    own = inspect.signature(command, eval_str=True)
+    options = inspect.signature(BvhOptions, eval_str=True).parameters
+    spread: list[inspect.Parameter] = []
+    for name, parameter in own.parameters.items():
+        spread += options.values() if name == "bvh" else [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
+
+    @functools.wraps(command)
+    def called(**given: Any) -> None:
+        bvh = BvhOptions(**{name: given.pop(name) for name in options})
+        command(bvh=bvh, **given)
+
+    called.__signature__ = own.replace(parameters=spread)  # type: ignore[attr-defined]
+    called.__annotations__ = {parameter.name: parameter.annotation for parameter in spread}
+    return called
 
 
 def _metres(unit: str) -> float:
@@ -111,11 +133,14 @@ def open_character(path: Path | None, output: Path | None) -> Skeleton | None:
     return load_skeleton(path)
 
 
-def played(motion: Motion, character: Skeleton | None, planted: Bool[np.ndarray, "frames 2"]) -> Motion:
-    """The motion, on the character if there is one."""
+def played(
+    motion: Motion, character: Skeleton | None, planted: Bool[np.ndarray, "frames 2"], *, size: float = 1.0
+) -> Motion:
+    """The motion, on the character in a size if there is one."""
+    from stridecast.body.character import resized
     from stridecast.body.recasting import recast
 
-    return motion if character is None else recast(motion, character, planted)
+    return motion if character is None else recast(motion, resized(character, size), planted)
 
 
 def height_of(character: Skeleton, model: Skeleton) -> float:

@@ -8,17 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from stridecast.cli.bodies import (
-    BvhFor,
-    BvhOrder,
-    BvhRest,
-    BvhRoot,
-    BvhUnit,
-    BvhUp,
+    BvhOptions,
     CharacterOption,
-    bvh_written,
+    CompactOption,
     height_of,
     open_character,
     played,
+    with_bvh_options,
 )
 from stridecast.cli.databases import DatabaseOption, open_database
 
@@ -28,7 +24,9 @@ if TYPE_CHECKING:
     from stridecast.formats.crowd_files import CrowdFiles
 
 
+@with_bvh_options
 def crowd(
+    *,
     scene: Annotated[Path, typer.Argument(metavar="SCENE.yaml", help="The place, who is there and who comes.")],
     output: Annotated[
         Path,
@@ -50,16 +48,9 @@ def crowd(
     seed: Annotated[int | None, typer.Option(metavar="N", help="Of all chance; else that of the scene.")] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Frames a second; else the database's.")] = None,
     threads: Annotated[int, typer.Option(metavar="N", help="Threads; the result does not depend on it.")] = 1,
-    compact: Annotated[
-        bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
-    ] = False,
+    compact: CompactOption = False,
     skeleton: CharacterOption = None,
-    bvh_for: BvhFor = None,
-    bvh_unit: BvhUnit = None,
-    bvh_order: BvhOrder = None,
-    bvh_up: BvhUp = None,
-    bvh_root: BvhRoot = None,
-    bvh_rest: BvhRest = None,
+    bvh: BvhOptions,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
@@ -69,6 +60,7 @@ def crowd(
     """
     from stridecast.cli import screen
     from stridecast.crowd.baking import Baking
+    from stridecast.crowd.bodies import person_height
     from stridecast.crowd.crowd import Crowd
     from stridecast.errors import InputError
     from stridecast.formats.crowd_files import CrowdFiles
@@ -79,10 +71,12 @@ def crowd(
     if seed is not None and not 0 <= seed < 2**32:
         raise InputError(f"--seed must be a whole number from 0 to {2**32 - 1}, not {seed}")
     place = load_scene(scene)
-    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
-    files = CrowdFiles(output, movers=len(place.movers), convention=convention, compact=compact)
+    convention = bvh.convention(output)
     character = open_character(skeleton, output)
+    files = CrowdFiles(output, movers=len(place.movers), convention=convention, compact=compact, character=skeleton)
     learned = open_database(database, quiet=quiet)
+    usual = person_height(learned)
+    tall = usual if character is None else height_of(character, learned.skeleton)
     with screen.progress(quiet, {"ways": "finding ways", "bake": "walking"}) as progress:
         people = Crowd(
             learned,
@@ -101,11 +95,11 @@ def crowd(
                     for one in baked.finished:
                         if one.motion is None or one.planted is None:
                             continue
-                        height = people.height(one.number)
-                        if character is not None:
-                            height = height_of(character, one.motion.skeleton)
-                        motion = played(one.motion, character, one.planted)
-                        files.add_motion(one.number, one.person.name, one.start, motion, height, planted=one.planted)
+                        size = people.height(one.number) / usual
+                        motion = played(one.motion, character, one.planted, size=size)
+                        files.add_motion(
+                            one.number, one.person.name, one.start, motion, size * tall, planted=one.planted
+                        )
                     done = baking.tally.frames
                     progress("bake", done, done if baked.last else baking.frames)
         finally:

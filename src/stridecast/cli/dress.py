@@ -9,21 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stridecast.cli.bodies import (
-    BvhFor,
-    BvhOrder,
-    BvhRest,
-    BvhRoot,
-    BvhUnit,
-    BvhUp,
+    BvhOptions,
     CharacterOption,
-    bvh_written,
+    CompactOption,
     height_of,
     open_character,
     played,
+    with_bvh_options,
 )
 from stridecast.cli.databases import DatabaseOption, open_database
 
 if TYPE_CHECKING:
+    from stridecast.crowd.bodies import person_height
     from stridecast.crowd.dressing import DressedPerson
     from stridecast.crowd.human import TrackReport
     from stridecast.formats.crowd_files import CrowdFiles
@@ -33,7 +30,9 @@ WORST_SHOWN = 3
 """So many people are named whose trajectories no person could have walked."""
 
 
+@with_bvh_options
 def dress(
+    *,
     trajectories: Annotated[
         Path, typer.Argument(metavar="TRAJECTORIES", help="CSV, Parquet, JuPedSim's SQLite, Juelich's or ETH's text.")
     ],
@@ -62,16 +61,9 @@ def dress(
     height: Annotated[float | None, typer.Option(metavar="M", help="Of all bodies; else that of the database.")] = None,
     rate: Annotated[float | None, typer.Option(metavar="HZ", help="Frames a second; else the database's.")] = None,
     threads: Annotated[int, typer.Option(metavar="N", help="Threads; the result does not depend on it.")] = 1,
-    compact: Annotated[
-        bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
-    ] = False,
+    compact: CompactOption = False,
     skeleton: CharacterOption = None,
-    bvh_for: BvhFor = None,
-    bvh_unit: BvhUnit = None,
-    bvh_order: BvhOrder = None,
-    bvh_up: BvhUp = None,
-    bvh_root: BvhRoot = None,
-    bvh_rest: BvhRest = None,
+    bvh: BvhOptions,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a report as JSON.")] = False,
 ) -> None:
@@ -79,7 +71,6 @@ def dress(
 
     Noise, sway and what no person can do are taken out; the report tells how far that leads away from the source.
     """
-    from stridecast.body.character import stature
     from stridecast.cli import screen
     from stridecast.crowd.dressing import dress_each, summed
     from stridecast.errors import FileError, InputError
@@ -88,15 +79,16 @@ def dress(
 
     if threads < 1:
         raise InputError(f"at least 1 thread is needed, not {threads}")
-    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
-    files = CrowdFiles(output, convention=convention, compact=compact)
+    convention = bvh.convention(output)
     character = open_character(skeleton, output)
+    files = CrowdFiles(output, convention=convention, compact=compact, character=skeleton)
     if trajectories.absolute() in {path.absolute() for path in files.files}:
         raise FileError("would be overwritten by the result; name another output", path=trajectories)
     with screen.progress(quiet, {}):  # for what the package has to say about the file
         source = load_trajectories(trajectories, frame_rate=input_rate, unit=unit, format=format)
     learned = open_database(database, quiet=quiet)
-    tall = height or stature(learned.skeleton) if character is None else height_of(character, learned.skeleton)
+    size = 1.0 if height is None else height / person_height(learned)
+    tall = size * height_of(learned.skeleton if character is None else character, learned.skeleton)
     people: list[dict[str, Any]] = []
     reports: list[TrackReport] = []
     with screen.progress(quiet, {"dress": "dressing rows"}) as progress:
@@ -114,7 +106,7 @@ def dress(
             with files:
                 for one in each:
                     reports.append(one.report)
-                    people.append(_write(files, one, character, tall, rate or learned.frame_rate))
+                    people.append(_write(files, one, character, size, tall, rate or learned.frame_rate))
         finally:
             if files.kept:
                 screen.tell_kept(files.kept, files.motions)
@@ -126,7 +118,7 @@ def dress(
 
 
 def _write(
-    files: CrowdFiles, one: DressedPerson, character: Skeleton | None, height: float, rate: float
+    files: CrowdFiles, one: DressedPerson, character: Skeleton | None, size: float, height: float, rate: float
 ) -> dict[str, Any]:
     """Write somebody down; what there is to say of them."""
     import numpy as np
@@ -137,7 +129,7 @@ def _write(
     files.add_rows(ids, times, v.position, np.asarray(v.heading), np.linalg.norm(v.velocity, axis=-1))
     file = None
     if one.motion is not None and one.planted is not None:
-        motion = played(one.motion, character, one.planted)
+        motion = played(one.motion, character, one.planted, size=size)
         file = str(files.add_motion(one.person, str(one.person), one.start, motion, height, planted=one.planted))
     return {"person": one.person, "start": one.start, "frames": one.frames, "file": file, **asdict(one.report)}
 

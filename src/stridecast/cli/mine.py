@@ -8,16 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from stridecast.cli.bodies import (
-    BvhFor,
-    BvhOrder,
-    BvhRest,
-    BvhRoot,
-    BvhUnit,
-    BvhUp,
+    BvhOptions,
     CharacterOption,
-    bvh_written,
+    CompactOption,
     open_character,
     played,
+    with_bvh_options,
 )
 from stridecast.cli.databases import Database, open_database
 
@@ -30,7 +26,9 @@ CLIPS_SHOWN = 12
 """So many clips of a blend are shown."""
 
 
+@with_bvh_options
 def mine(
+    *,
     database: Database = None,
     status: Annotated[
         str | None,
@@ -60,16 +58,9 @@ def mine(
             "--output", "-o", metavar="OUT.bvh|.glb|.usd[a|c]", help="The motion to write.", show_default=False
         ),
     ] = None,
-    compact: Annotated[
-        bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
-    ] = False,
+    compact: CompactOption = False,
     skeleton: CharacterOption = None,
-    bvh_for: BvhFor = None,
-    bvh_unit: BvhUnit = None,
-    bvh_order: BvhOrder = None,
-    bvh_up: BvhUp = None,
-    bvh_root: BvhRoot = None,
-    bvh_rest: BvhRest = None,
+    bvh: BvhOptions,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was found as JSON.")] = False,
 ) -> None:
@@ -84,7 +75,7 @@ def mine(
 
     if output is not None:
         check_motion_place(output, compact=compact)
-    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
+    convention = bvh.convention(output)
     character = open_character(skeleton, output)
     wish = {name: _number(name, text) for name, text in (("speed", speed), ("turn", turn), ("style", style))}
     learned = open_database(database, quiet=quiet)

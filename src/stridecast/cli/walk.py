@@ -11,16 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from stridecast.cli.bodies import (
-    BvhFor,
-    BvhOrder,
-    BvhRest,
-    BvhRoot,
-    BvhUnit,
-    BvhUp,
+    BvhOptions,
     CharacterOption,
-    bvh_written,
+    CompactOption,
     open_character,
     played,
+    with_bvh_options,
 )
 from stridecast.cli.databases import Database, open_database
 
@@ -42,7 +38,9 @@ SLOWED_SHOWN = 5
 """So many places are told at which a plan is slower than asked for."""
 
 
+@with_bvh_options
 def walk(
+    *,
     database: Database = None,
     output: Annotated[
         Path | None,
@@ -89,16 +87,9 @@ def walk(
     vmc: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Play it in real time to a receiver of the VMC protocol.")
     ] = None,
-    compact: Annotated[
-        bool, typer.Option("--compact", help="A GLB of half the size: rotations as numbers of 16 bits.")
-    ] = False,
+    compact: CompactOption = False,
     skeleton: CharacterOption = None,
-    bvh_for: BvhFor = None,
-    bvh_unit: BvhUnit = None,
-    bvh_order: BvhOrder = None,
-    bvh_up: BvhUp = None,
-    bvh_root: BvhRoot = None,
-    bvh_rest: BvhRest = None,
+    bvh: BvhOptions,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing unless something is wrong.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
 ) -> None:
@@ -126,7 +117,7 @@ def walk(
     if trace is not None:
         check_place(trace)
     sender = None if vmc is None else _sender(vmc)
-    convention = bvh_written(output, bvh_for, bvh_unit, bvh_order, bvh_up, bvh_root, bvh_rest)
+    convention = bvh.convention(output)
     character = open_character(skeleton, output)
     how: dict[str, Any] = {"subject": subject, "frame_rate": rate, "size": size}
     if style is not None:
