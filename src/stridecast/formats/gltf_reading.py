@@ -50,6 +50,7 @@ class GltfReader:
         self._file = file
         self._start, self._size = 0, 0
         self._read = 0
+        self._lists: dict[str, list[dict[str, Any]]] = {}  # of the document, once they are looked through
         self.document = self._open()
         self.parents = self._parents()
 
@@ -65,9 +66,13 @@ class GltfReader:
 
     def objects(self, part: str, within: Mapping[str, Any] | None = None, where: str = "") -> list[dict[str, Any]]:
         """A list of objects of the document, empty where there is none."""
+        if within is None and part in self._lists:
+            return self._lists[part]
         found = (self.document if within is None else within).get(part, [])
         if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
             self.wrong(f"{where}{part} must be a list of objects")
+        if within is None:
+            self._lists[part] = found
         return found
 
     def one(self, part: str, index: object, where: str) -> dict[str, Any]:
