@@ -175,6 +175,15 @@ def test_of_many_joints_a_few_are_listed(tmp_path):
         load_skeleton(tmp_path / "rig.glb")
 
 
+def test_a_character_in_centimetres_is_named(database, tmp_path):
+    export(tmp_path / "rig.glb", exported_rigs.READY_PLAYER_ME, humanoid(100.0))
+    words = ["walk", database, "--curve", "line:2", "--skeleton", tmp_path / "rig.glb", "-o", tmp_path / "out.glb"]
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    assert result.exit_code == 2
+    assert "rig.glb: its legs are 85 m long" in result.stderr
+    assert not (tmp_path / "out.glb").exists()
+
+
 def in_blender(blender: str, *arguments: object) -> str:
     command = [blender, *map(str, arguments)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
