@@ -20,9 +20,11 @@ from stridecast.body.mannequin import mannequin
 from stridecast.cli.main import app
 from stridecast.errors import FileError, SkeletonError
 from stridecast.formats.bvh_conventions import standing_height
+from stridecast.formats.glb import write_glb
 from stridecast.formats.recordings import load_motion, load_skeleton
 from stridecast.formats.store import save_database
 from stridecast.model.skeleton import Skeleton
+from synthetic_gait import gait
 
 TALL = 1.78
 """Height of the mannequin, metres."""
@@ -30,8 +32,6 @@ TALL = 1.78
 EXPORTS: dict[str, tuple[Export, Skeleton, str]] = {
     "Mixamo through Blender": (exported_rigs.MIXAMO, humanoid(), ".glb"),
     "VRoid": (exported_rigs.VROID, humanoid(), ".vrm"),
-    "VRM 0, own names": (exported_rigs.VRM0, humanoid(), ".vrm"),
-    "VRM 1, own names": (exported_rigs.VRM1, humanoid(), ".vrm"),
     "Ready Player Me": (exported_rigs.READY_PLAYER_ME, humanoid(), ".glb"),
     "Unreal": (exported_rigs.UNREAL, posed_at_rest(humanoid(), A_POSE), ".glb"),
     "Rigify, joined": (exported_rigs.RIGIFY, humanoid(), ".glb"),
@@ -79,10 +79,8 @@ def walks(database: Path, rig: Path, tmp_path: Path, tall: float) -> None:
     assert 0.9 < walked < 1.5
 
 
-@pytest.mark.parametrize("name", EXPORTS)
-def test_a_character_walks_as_it_was_exported(database, tmp_path, name):
-    how, body, suffix = EXPORTS[name]
-    rig = tmp_path / f"rig{suffix}"
+def check_found(rig: Path, how: Export, body: Skeleton) -> None:
+    """All joints are found where they are, in metres."""
     there = export(rig, how, body)
     found = load_skeleton(rig)
     named = {role: found.names[joint] for role, joint in found.roles.items()}
@@ -90,7 +88,43 @@ def test_a_character_walks_as_it_was_exported(database, tmp_path, name):
     assert found.leg_length == pytest.approx(body.leg_length, abs=1e-5)
     at, theirs = (kinematics.rest(one).positions[one.chain(*body.roles)] for one in (found, body))
     np.testing.assert_allclose(at - at[0], theirs - theirs[0], atol=1e-5)
-    walks(database, rig, tmp_path, TALL)
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_a_character_walks_as_it_was_exported(database, tmp_path, name):
+    how, body, suffix = EXPORTS[name]
+    check_found(tmp_path / f"rig{suffix}", how, body)
+    walks(database, tmp_path / f"rig{suffix}", tmp_path, TALL)
+
+
+@pytest.mark.parametrize("how", [exported_rigs.VRM0, exported_rigs.VRM1])
+def test_vrm_tells_which_bone_is_what(tmp_path, how):
+    check_found(tmp_path / "rig.vrm", how, humanoid())
+    (tmp_path / "rig.vrm").rename(tmp_path / "rig.glb")
+    assert len(load_skeleton(tmp_path / "rig.glb").roles) == 22
+    mine = {"left_thigh": "Bone.001"}
+    assert load_skeleton(tmp_path / "rig.glb", roles=mine).joint("left_thigh") == 1
+
+
+def test_an_animation_of_vrm_is_a_recording(tmp_path):
+    walk = gait(np.full(20, 1.2), rate=30.0).motion
+    write_glb(tmp_path / "walk.glb", walk)
+    glb = Glb((tmp_path / "walk.glb").read_bytes())
+    document = glb.document
+    index = {node["name"]: k for k, node in enumerate(document["nodes"])}
+    bones = {theirs: {"node": index[ours]} for ours, theirs in exported_rigs.VRM_BONES.items() if ours in index}
+    for node in document["nodes"]:
+        node["name"] = f"node {index[node['name']]}"
+        node.pop("mesh", None), node.pop("skin", None)
+    for part in ("skins", "meshes", "materials"):
+        document.pop(part, None)
+    document["extensions"] = {"VRMC_vrm_animation": {"humanoid": {"humanBones": bones}}}
+    (tmp_path / "walk.vrma").write_bytes(exported_rigs.packed(document, glb.numbers))
+    back = load_motion(tmp_path / "walk.vrma")
+    known = [role for role in walk.skeleton.roles if role in back.skeleton.roles]
+    assert len(known) >= 18
+    at, ours = (kinematics.pose(one).positions[:, one.skeleton.chain(*known)] for one in (back, walk))
+    assert np.abs(at - ours).max() < 1e-5
 
 
 def test_a_hat_is_no_body(tmp_path):
@@ -139,6 +173,15 @@ def test_of_many_joints_a_few_are_listed(tmp_path):
     export(tmp_path / "rig.glb", how)
     with pytest.raises(SkeletonError, match=r"no joint found for hips, .* and 144 more\. Name them"):
         load_skeleton(tmp_path / "rig.glb")
+
+
+def test_a_character_in_centimetres_is_named(database, tmp_path):
+    export(tmp_path / "rig.glb", exported_rigs.READY_PLAYER_ME, humanoid(100.0))
+    words = ["walk", database, "--curve", "line:2", "--skeleton", tmp_path / "rig.glb", "-o", tmp_path / "out.glb"]
+    result = CliRunner().invoke(app, [str(word) for word in words])
+    assert result.exit_code == 2
+    assert "rig.glb: its legs are 85 m long" in result.stderr
+    assert not (tmp_path / "out.glb").exists()
 
 
 def in_blender(blender: str, *arguments: object) -> str:

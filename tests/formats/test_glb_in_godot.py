@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import time
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from bodies import writhing
+from exported_rigs import MIXAMO, export
 from stridecast.body import kinematics
 from stridecast.formats.glb import GlbCrowd, write_glb
 from stridecast.formats.motion_files import write_motion
@@ -72,9 +74,9 @@ def project(godot, tmp_path) -> Project:
 
 
 def places(joints: list[list[Any]], names: Sequence[str]) -> np.ndarray:
-    """Bones in the order of ours; Godot 3 spells ``LeftUpLeg`` as ``left_up_leg``."""
-    plain = {name.replace("_", "").lower(): at for name, *at in joints}
-    return np.array([plain[name.replace("_", "").lower()] for name in names])
+    """Bones in the order of ours; Godot 3 spells ``mixamorig:LeftUpLeg`` as ``mixamorigleft_up_leg``."""
+    plain = {re.sub("[_:]", "", name).lower(): at for name, *at in joints}
+    return np.array([plain[re.sub("[_:]", "", name).lower()] for name in names])
 
 
 def between(motion: Motion, frame: float) -> np.ndarray:
@@ -133,7 +135,7 @@ def test_a_crowd_plays_on_one_clock(project, tmp_path):
 
 
 def test_a_moved_character_plays(project, tmp_path):
-    write_glb(tmp_path / "rig.glb", gait(np.full(4, 1.2), rate=30.0).motion)
+    export(tmp_path / "rig.glb", MIXAMO)
     moved = writhing(load_skeleton(tmp_path / "rig.glb"), frames=20, seed=2)
     write_motion(tmp_path / "moved.glb", moved, character=tmp_path / "rig.glb")
     project.imports("moved.glb", (f"animation/fps={moved.frame_rate:g}", EXACT[1]))

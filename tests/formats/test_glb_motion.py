@@ -58,6 +58,17 @@ def test_the_first_of_a_crowd_comes_back_at_its_own_size(tmp_path, walk):
     assert np.abs(kinematics.pose(back).positions - kinematics.pose(one).positions).max() < 1e-5
 
 
+def test_skins_that_are_endless_are_refused(tmp_path, walk, monkeypatch):
+    write_glb(tmp_path / "a.glb", walk)
+    glb = Glb((tmp_path / "a.glb").read_bytes())
+    glb.document["skins"] *= 10
+    (tmp_path / "b.glb").write_bytes(packed(glb.document, glb.numbers))
+    assert load_skeleton(tmp_path / "b.glb").names == walk.skeleton.names
+    monkeypatch.setattr("stridecast.formats.glb_motion.MOST_WALKED", 300)
+    with pytest.raises(FileError, match="has skins with more than 300 joints"):
+        load_skeleton(tmp_path / "b.glb")
+
+
 def animators_rig(path: Path, walk: Motion, seed: int, unit: float, skinned: bool) -> None:
     """The rig of an animator: turned joints, centimetres below a scaled node that is turned to z up."""
     write_glb(path, walk)

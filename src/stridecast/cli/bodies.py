@@ -19,10 +19,15 @@ if TYPE_CHECKING:
     from stridecast.model.motion import Motion
     from stridecast.model.skeleton import Skeleton
 
+LEGS = (0.15, 4.0)
+"""Of characters that can walk, thigh and shin in metres; longer or shorter ones are in another unit."""
+
 CharacterOption = Annotated[
     Path | None,
     typer.Option(
-        "--skeleton", metavar="CHARACTER.bvh|.glb", help="Play it on this character's skeleton; else on the database's."
+        "--skeleton",
+        metavar="CHARACTER.bvh|.glb|.vrm",
+        help="Play it on this character's skeleton; else on the database's.",
     ),
 ]
 CompactOption = Annotated[
@@ -119,9 +124,9 @@ def open_character(path: Path | None, output: Path | None) -> Skeleton | None:
     InputError
         No motion is written.
     FileError, SkeletonError
-        As of ``load_skeleton``.
+        As of ``load_skeleton``; or its legs are those of no character, as a file in centimetres has them.
     """
-    from stridecast.errors import FileError, InputError
+    from stridecast.errors import FileError, InputError, SkeletonError
     from stridecast.formats.recordings import load_skeleton
 
     if path is None:
@@ -130,7 +135,13 @@ def open_character(path: Path | None, output: Path | None) -> Skeleton | None:
         raise InputError("--skeleton goes with an output that has bodies, such as *.bvh")
     if path.absolute() == output.absolute():
         raise FileError("would be overwritten by the result; name another output", path=path)
-    return load_skeleton(path)
+    skeleton = load_skeleton(path)
+    if not LEGS[0] <= skeleton.leg_length <= LEGS[1]:
+        raise SkeletonError(
+            f"{path}: its legs are {skeleton.leg_length:.3g} m long, and {LEGS[0]:g} to {LEGS[1]:g} m can walk; "
+            "was it exported in another unit than metres?"
+        )
+    return skeleton
 
 
 def played(
