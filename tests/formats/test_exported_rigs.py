@@ -175,12 +175,21 @@ def test_of_many_joints_a_few_are_listed(tmp_path):
         load_skeleton(tmp_path / "rig.glb")
 
 
-def test_a_character_in_centimetres_is_named(database, tmp_path):
+def test_a_character_in_centimetres_stays_so(database, tmp_path):
     export(tmp_path / "rig.glb", exported_rigs.READY_PLAYER_ME, humanoid(100.0))
+    words = ["walk", database, "--curve", "line:2", "--skeleton", tmp_path / "rig.glb", "-o", tmp_path / "out.glb"]
+    assert CliRunner().invoke(app, [str(word) for word in words]).exit_code == 0
+    hips = Glb((tmp_path / "out.glb").read_bytes())
+    at = hips.world(0, 0.5)[:, 1, 3].max()
+    assert 150.0 < at < 180.0
+
+
+def test_a_giant_is_named(database, tmp_path):
+    export(tmp_path / "rig.glb", exported_rigs.READY_PLAYER_ME, humanoid(6.0))
     words = ["walk", database, "--curve", "line:2", "--skeleton", tmp_path / "rig.glb", "-o", tmp_path / "out.glb"]
     result = CliRunner().invoke(app, [str(word) for word in words])
     assert result.exit_code == 2
-    assert "rig.glb: its legs are 85 m long" in result.stderr
+    assert "rig.glb: its legs are 5.1 m long" in result.stderr
     assert not (tmp_path / "out.glb").exists()
 
 

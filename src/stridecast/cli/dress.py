@@ -20,7 +20,6 @@ from stridecast.cli.bodies import (
 from stridecast.cli.databases import DatabaseOption, open_database
 
 if TYPE_CHECKING:
-    from stridecast.crowd.bodies import person_height
     from stridecast.crowd.dressing import DressedPerson
     from stridecast.crowd.human import TrackReport
     from stridecast.formats.crowd_files import CrowdFiles
@@ -72,6 +71,7 @@ def dress(
     Noise, sway and what no person can do are taken out; the report tells how far that leads away from the source.
     """
     from stridecast.cli import screen
+    from stridecast.crowd.bodies import person_height
     from stridecast.crowd.dressing import dress_each, summed
     from stridecast.errors import FileError, InputError
     from stridecast.formats.crowd_files import CrowdFiles
