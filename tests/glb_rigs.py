@@ -60,7 +60,14 @@ def numbers(values: np.ndarray) -> list[float]:
 
 
 def artists_rig(
-    path: Path, skeleton: Skeleton, *, seed: int = 0, unit: float = 1.0, armature: float = 1.0, picture: bool = True
+    path: Path,
+    skeleton: Skeleton,
+    *,
+    seed: int = 0,
+    unit: float = 1.0,
+    armature: float = 1.0,
+    picture: bool = True,
+    matrices: bool = True,
 ) -> None:
     """A figure that faces anywhere, in two skinned meshes of different spaces, with a hat on its head.
 
@@ -74,6 +81,8 @@ def artists_rig(
         Scale of the node above the joints.
     picture
         Whether there is a texture.
+    matrices
+        Whether some nodes have a matrix, which no animation may turn.
     """
     rng, parts = np.random.default_rng(seed), Parts()
     parts.document["asset"] = {"version": "2.0", "copyright": "Ann Artist"}
@@ -86,7 +95,7 @@ def artists_rig(
 
     def local(above: np.ndarray, own: np.ndarray) -> dict[str, Any]:
         own = np.linalg.inv(above) @ own
-        if rng.uniform() < 0.2:
+        if matrices and rng.uniform() < 0.2:
             return {"matrix": numbers(own.T.ravel())}
         size = float(np.cbrt(np.linalg.det(own[:3, :3])))
         turn = Rotation.from_matrix(own[:3, :3] / size).as_quat()

@@ -14,7 +14,11 @@ from stridecast.model.motion import Motion
 OF_NODES = ("KHR_node_visibility", "EXT_mesh_gpu_instancing")
 """Extensions of nodes that point at no other node, and so can be there for each person."""
 
-UNMOVED = ("children", "mesh", "skin", "weights", "camera", "extensions")
+OF_ASSET = ("copyright", "minVersion")
+"""What a file says of itself that stays true in another."""
+
+APART = ("children", "mesh", "skin", "weights", "camera", "extensions")
+"""Of a node, what is put together anew."""
 
 
 class RigFigure:
@@ -95,9 +99,7 @@ class RigFigure:
         """What a document with this figure says beside its lists: who made it, and which extensions it needs."""
         document = self.rig.document
         asset = document.get("asset")
-        told = (
-            {key: asset[key] for key in ("copyright", "minVersion") if key in asset} if isinstance(asset, dict) else {}
-        )
+        told = {key: asset[key] for key in OF_ASSET if key in asset} if isinstance(asset, dict) else {}
         carried = [document.get(part) for part in SHARED] + [self._own, self._meshes, [*self._skins.values()]]
         here = set(extensions_in(carried))
         gone = set(extensions_in(document)) - here  # what nothing names, such as quantised numbers, is in the meshes
@@ -153,14 +155,15 @@ class RigFigure:
     def _is_spare(self, node: int, wanted: set[int]) -> bool:
         """Whether nothing is left of a node when its skinned mesh, camera or light is elsewhere."""
         told = self._nodes[node]
-        if any(child in wanted for child in told.get("children", ())):
+        rigid = "mesh" in told and "skin" not in told
+        if rigid or any(child in wanted for child in told.get("children", ())):
             return False
         return "skin" in told or "camera" in told or "KHR_lights_punctual" in _extensions(told)
 
     def _plain(self, node: int) -> dict[str, Any]:
         """A node as it is kept, without what points at other nodes; meshes stay where they are rigid."""
         told = self._nodes[node]
-        out = {key: value for key, value in told.items() if key not in UNMOVED}
+        out = {key: value for key, value in told.items() if key not in APART}
         if "mesh" in told and "skin" not in told:
             out |= {key: told[key] for key in ("mesh", "weights") if key in told}
         return {**out, **_extended(told)}
