@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import re
+import runpy
 import sys
 from pathlib import Path
 from typing import Any
@@ -44,8 +44,8 @@ def mixamo(description: str, saved: str) -> None:
     bpy.ops.export_scene.fbx(filepath=saved, add_leaf_bones=False, bake_anim=False)
 
 
-def rigify(as_it_is: str, joined: str) -> None:
-    """The human of Rigify with blocks for a skin, as it is, and once its deforming bones are made one tree."""
+def rigify(as_it_is: str, example: str, joined: str) -> None:
+    """The human of Rigify with blocks for a skin, as Blender exports it, and as our script does."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.preferences.addon_enable(module="rigify")
     bpy.ops.object.armature_human_metarig_add()
@@ -57,33 +57,8 @@ def rigify(as_it_is: str, joined: str) -> None:
         bpy.data.objects.remove(bpy.data.objects[name])
     _blocks(rig)
     bpy.ops.export_scene.gltf(filepath=as_it_is, export_animations=False)
-    bpy.context.view_layer.objects.active = rig
-    bpy.ops.object.mode_set(mode="EDIT")
-    bones = rig.data.edit_bones
-    for bone in [one for one in bones if one.use_deform]:
-        above = bone.parent
-        if above is None or not above.use_deform:
-            bone.parent = bones.get(_above(bone.name))
-    bpy.ops.object.mode_set(mode="OBJECT")
-    bpy.ops.export_scene.gltf(filepath=joined, export_animations=False, export_def_bones=True)
-
-
-def _above(name: str) -> str:
-    """From which bone one hangs that a control rig holds."""
-    side = name[-2:] if name.endswith((".L", ".R")) else ""
-    for pattern, above in (
-        (r"DEF-spine$", ""),
-        (r"DEF-(thigh|pelvis)", "DEF-spine"),
-        (r"DEF-(shoulder|breast)", "DEF-spine.003"),
-        (r"DEF-upper_arm", f"DEF-shoulder{side}"),
-        (r"DEF-(palm|f_|thumb)", f"DEF-hand{side}"),
-    ):
-        if re.match(pattern, name):
-            return above
-    if found := re.match(r"DEF-spine\.(\d+)$", name):
-        before = int(found.group(1)) - 1
-        return f"DEF-spine.{before:03d}" if before else "DEF-spine"
-    return "DEF-spine.006"
+    sys.argv = [example, "--", rig.name, joined]
+    runpy.run_path(example, run_name="__main__")
 
 
 def _blocks(rig: Any) -> None:

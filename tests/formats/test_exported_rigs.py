@@ -201,7 +201,7 @@ def in_blender(blender: str, *arguments: object) -> str:
 
 
 SCRIPT = Path(__file__).with_name("blender_characters.py")
-CONVERTER = Path(__file__).resolve().parents[2] / "integrations" / "blender" / "fbx_to_glb.py"
+CONVERTERS = Path(__file__).resolve().parents[2] / "integrations" / "blender"
 
 
 def test_an_fbx_as_of_mixamo_walks(blender, database, tmp_path):
@@ -218,7 +218,7 @@ def test_an_fbx_as_of_mixamo_walks(blender, database, tmp_path):
     told |= {"joints": skin.joints.tolist(), "weights": skin.weights.tolist()}
     (tmp_path / "rig.json").write_text(json.dumps(told))
     in_blender(blender, SCRIPT, "mixamo", tmp_path / "rig.json", tmp_path / "rig.fbx")
-    assert "at rest" in in_blender(blender, CONVERTER, tmp_path / "rig.fbx", tmp_path / "rig.glb")
+    assert "at rest" in in_blender(blender, CONVERTERS / "fbx_to_glb.py", tmp_path / "rig.fbx", tmp_path / "rig.glb")
     found = load_skeleton(tmp_path / "rig.glb")
     assert found.leg_length == pytest.approx(body.leg_length, rel=1e-4)
     assert len(found.roles) == len(body.roles)
@@ -226,7 +226,8 @@ def test_an_fbx_as_of_mixamo_walks(blender, database, tmp_path):
 
 
 def test_rigify_walks_once_its_bones_hang_together(blender, database, tmp_path):
-    in_blender(blender, SCRIPT, "rigify", tmp_path / "rig.glb", tmp_path / "joined.glb")
+    files = (tmp_path / "rig.glb", CONVERTERS / "rigify_to_glb.py", tmp_path / "joined.glb")
+    assert "160 bones of rig, 1 meshes" in in_blender(blender, SCRIPT, "rigify", *files)
     with pytest.raises(FileError, match=r"a control rig of Rigify: its bones DEF-spine and DEF-thigh\.L do not hang"):
         load_skeleton(tmp_path / "rig.glb")
     assert len(load_skeleton(tmp_path / "joined.glb").roles) == 22

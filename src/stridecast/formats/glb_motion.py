@@ -380,7 +380,7 @@ class GlbFigure:
         if spine is not None and thigh is not None and spine != thigh:
             self.reader.wrong(
                 "is a control rig of Rigify: its bones DEF-spine and DEF-thigh.L do not hang together, so only Blender "
-                "can move it; give the DEF- bones each other as parents and export only them (docs/character.md)"
+                "can move it; export it with integrations/blender/rigify_to_glb.py"
             )
 
     def _bound(self, skin: Mapping[str, Any], number: int) -> dict[int, Float[Array, "4"]]:
