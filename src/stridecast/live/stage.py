@@ -27,7 +27,8 @@ from stridecast.live.hall import Guest, Hall
 from stridecast.live.layout import CLAMPED
 from stridecast.live.outbox import Outbox
 from stridecast.live.pacing import Pacer
-from stridecast.live.scene_play import Gone, ScenePlay
+from stridecast.live.scene_play import ScenePlay
+from stridecast.live.searching import Gone
 from stridecast.live.staging import place_in
 from stridecast.live.telling import database_part, database_state, skeleton_part
 from stridecast.live.walking import Walking
@@ -80,6 +81,10 @@ class Stage(threading.Thread):
 
     def put(self, message: object) -> bool:
         """Hand over a message; False where too many wait."""
+        if isinstance(message, say.CancelMessage) and message.what == "ways":
+            if hasattr(self, "scene"):
+                self.scene.search.give_up()  # at once, as the stage is busy with what is to be given up
+            return True
         try:
             self._inbox.put_nowait(message)
         except queue.Full:

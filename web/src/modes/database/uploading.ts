@@ -21,7 +21,7 @@ export class Uploading {
   private readonly bar = el("progress", { class: "progress", max: 1, value: 0, "aria-label": "Progress" });
   private readonly stage = el("p", { class: "hint", role: "status" });
   private readonly buildButton = button("Build a database", () => this.build(), { kind: "primary" });
-  private readonly cancelButton = button("Cancel", () => this.page.connection.send({ type: "cancel" }), {});
+  private readonly cancelButton = button("Cancel", () => this.page.connection.send({ type: "cancel", what: "build" }), {});
   private readonly forgetButton = button("Forget them", () => this.page.connection.send({ type: "forget_files" }), {
     kind: "quiet",
   });

@@ -30,6 +30,7 @@ import {
   thingAt,
 } from "./document";
 import { SceneDrawing } from "./drawing";
+import { Finding } from "./finding";
 import { History } from "./history";
 import { inspector } from "./inspector";
 import { crossing, square } from "./starter";
@@ -133,7 +134,7 @@ export class SceneMode implements Mode {
       say: (text) => this.page.messages.say(text),
     });
     this.timeline = new Timeline(page.connection, () => this.sendWaiting());
-    this.foot.append(this.problem, this.hint, this.timeline.element);
+    this.foot.append(new Finding(page.connection).element, this.problem, this.hint, this.timeline.element);
     this.problem.hidden = true;
     this.view = segmented<View>(
       "Camera",
@@ -169,11 +170,17 @@ export class SceneMode implements Mode {
       for (const somebody of people) this.people.set(somebody.id, somebody);
       if (begins) this.drawing.setMovers(movers);
     });
-    connection.on("scene_checked", ({ applied, message, place }) => {
-      this.problem.hidden = applied !== "refused";
+    connection.on("scene_checked", ({ applied, message, place, anew }) => {
+      this.problem.hidden = applied !== "refused" && applied !== "cancelled";
       if (applied === "refused") setText(this.problem, place ? `${place}: ${message}` : message);
+      if (applied === "cancelled")
+        setText(this.problem, "Given up: what walks is as it was. Undo, or change something to try again.");
       if (applied === "restarted" || applied === "empty") this.page.between.clear();
-      if (applied === "restarted") this.ask(null);
+      if (applied === "restarted") {
+        this.ask(null);
+        if (message) messages.say(`The scene has begun anew: ${message}.`);
+      }
+      if (anew.length) messages.say(`${listed(anew)} ${anew.length > 1 ? "begin" : "begins"} anew; all others go on.`);
     });
     connection.on("scene_opened", ({ scene }) => {
       this.open(scene);
@@ -763,6 +770,11 @@ export class SceneMode implements Mode {
     );
     this.right.append(this.explained, this.inspected);
   }
+}
+
+function listed(names: readonly string[]): string {
+  const shown = names.length > 4 ? [...names.slice(0, 3), `${names.length - 3} more`] : names;
+  return shown.length > 1 ? `${shown.slice(0, -1).join(", ")} and ${shown.at(-1)}` : (shown[0] ?? "");
 }
 
 function toggled(refs: readonly Ref[], ref: Ref): Ref[] {
