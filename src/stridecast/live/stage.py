@@ -16,6 +16,7 @@ from stridecast import __version__
 from stridecast.crowd.rules import RULES
 from stridecast.errors import InputError
 from stridecast.formats.motion_files import write_motion
+from stridecast.formats.recordings import RECORDINGS
 from stridecast.formats.scenes import parse_scene, scene_of, scene_text, scene_values
 from stridecast.formats.store import load_database, save_database
 from stridecast.formats.vmc import VmcSender
@@ -264,9 +265,10 @@ class Stage(threading.Thread):
         if self._building is not None:
             raise InputError("a database is being built already; wait for it, or cancel it")
         uploads = self.guest.uploads
-        recordings = [path for path in uploads.paths if path.suffix != ".asf"]
+        recordings = [path for path in uploads.paths if path.suffix in RECORDINGS]
         if not recordings:
-            raise InputError("no recording has been uploaded yet; send BVH, or AMC with their ASF, first")
+            known = ", ".join(RECORDINGS.values())
+            raise InputError(f"no recording has been uploaded yet; send some first ({known})")
         output = self.guest.folder / "built.safetensors"
         self._build_request = message.request
         self._building = Building(
