@@ -51,7 +51,13 @@ export class Uploading {
     this.zone = el(
       "div",
       { class: "drop" },
-      el("p", {}, el("strong", {}, "Drop your recordings here"), el("br"), "BVH, AMC with its ASF, AMASS (NPZ), C3D or GLB"),
+      el(
+        "p",
+        {},
+        el("strong", {}, "Drop your recordings here"),
+        el("br"),
+        "BVH, AMC with its ASF, AMASS (NPZ), C3D or GLB",
+      ),
       button("Choose files", () => input.click(), { icon: icons.open }),
       input,
     );
