@@ -391,7 +391,9 @@ export class SceneMode implements Mode {
     const { cameras } = this.page.stage;
     this.placed = true;
     const [x0, z0, x1, z1] = box ?? [-5, -5, 5, 5];
-    cameras.lookAt((x0 + x1) / 2, (z0 + z1) / 2, Math.max(9, Math.hypot(x1 - x0, z1 - z0) * 1.02));
+    const { clientWidth, clientHeight } = this.page.stage.canvas;
+    const tall = Math.max(1, clientHeight / Math.max(1, clientWidth));
+    cameras.lookAt((x0 + x1) / 2, (z0 + z1) / 2, Math.max(9, Math.hypot(x1 - x0, z1 - z0) * 1.02 * tall));
     if (jump) cameras.jump();
   }
 
