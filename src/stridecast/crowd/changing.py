@@ -11,9 +11,6 @@ from stridecast.crowd.newcomers import walker_of
 from stridecast.model.people import Person, Source
 from stridecast.model.scene import Scene
 
-BEHAVIOR_OF_A_BODY = ("size", "style", "body_radius")
-"""What cannot be changed of somebody who is there; nor where they begin, how they look then, and their height."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Changes:
@@ -25,7 +22,7 @@ class Changes:
         Names of those who are new: they come as soon as they are due and have room.
     anew
         Names of those who have left their places and come once more, at their start: what was changed of them
-        (start, body, mood) only changes for who begins.
+        (start, heading, height, radius) only changes for who begins.
     altered
         Numbers of those who go on from where they are, in another way or elsewhere.
     removed
@@ -75,10 +72,8 @@ def difference(before: Scene, after: Scene) -> Difference:
 
 def has_to_begin_anew(before: Person, after: Person) -> bool:
     """Whether somebody who is there cannot simply go on as what they become."""
-    return not (
-        all(alike(getattr(before, name), getattr(after, name)) for name in ("start", "heading", "height"))
-        and all(getattr(before.behavior, name) == getattr(after.behavior, name) for name in BEHAVIOR_OF_A_BODY)
-    )
+    same = all(alike(getattr(before, name), getattr(after, name)) for name in ("start", "heading", "height"))
+    return not same or before.behavior.body_radius != after.behavior.body_radius
 
 
 def alike(one: object, other: object) -> bool:

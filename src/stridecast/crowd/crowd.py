@@ -231,8 +231,8 @@ class Crowd:
     def change(self, scene: Scene, *, progress: Callable[[int, int], None] | None = None) -> Changes:
         """Take over another scene while people walk: everybody who is in both goes on.
 
-        Where roads, obstacles or walls differ, all find new ways at once. Whose stops, speed, preferences or company
-        differ goes on in the new way, through the stops that are left; whose start, height, body or style differ comes
+        Where roads, obstacles or walls differ, all find new ways at once. Whose stops, behavior or company differ
+        goes on in the new way, through the stops that are left; whose start, heading, height or radius differ comes
         anew. Who is not in the scene any more vanishes, who is new comes as soon as there is room. Sources send what
         they say now; what they have sent stays. Who has arrived and left stays away.
 
@@ -352,6 +352,8 @@ class Crowd:
         way = np.zeros((1, 2))
         slot = float(self._traffic.people.slot[row])
         self._traffic.alter(row, newcomer_of(person, way, slot, self.bounds, self.seed))
+        if self._bodies is not None:
+            self._bodies.alter(row, size=person.behavior.size, style=person.behavior.style)
         self._people[row] = self.came[int(self._ids[row]) - 1] = person
 
     def _take_away(self, rows: list[int]) -> tuple[int, ...]:
