@@ -8,6 +8,7 @@ import io
 import json
 import time
 import zipfile
+from dataclasses import replace
 from urllib.parse import quote
 
 import numpy as np
@@ -15,12 +16,16 @@ import pytest
 
 from glbs import Glb
 from live_clients import Client, open_socket
+from marker_files import marker_places, write_c3d
+from smpl_files import on_smpl, write_amass
+from stridecast.formats.motion_files import write_motion
 from stridecast.formats.recordings import load_motion
 from stridecast.formats.store import load_database
 from stridecast.live.downloads import MOST, Downloads
 from stridecast.live.limits import usual_limits
 from stridecast.live.serve import LiveServer
 from stridecast.live.uploads import UploadRefusedError, Uploads, safe_name
+from synthetic_gait import gait, ramps
 
 LIMITS = usual_limits().model_copy(update={"file_bytes": 400_000, "files": 4, "files_bytes": 900_000})
 
@@ -69,6 +74,9 @@ def get(server, url):
         ("Walk 1 (slow).BVH", "Walk_1_slow.bvh"),
         ("../../etc/passwd.bvh", "passwd.bvh"),
         ("C:\\evil\\x.asf", "x.asf"),
+        ("walk_poses.NPZ", "walk_poses.npz"),
+        ("Trial01.C3D", "Trial01.c3d"),
+        ("a b.glb", "a_b.glb"),
         ("..bvh", "take.bvh"),
         ("/.bvh", "take.bvh"),
         ("träge\0.bvh", "tr_ge.bvh"),
@@ -81,7 +89,9 @@ def test_names_are_made_by_the_server(given, kept):
 
 @pytest.mark.parametrize("given", ["", "bvh", "x.exe", "x.bvh/", "x.bvh.zip", "x."])
 def test_other_kinds_of_files_are_refused(given):
-    with pytest.raises(UploadRefusedError, match=r"recordings are \*\.bvh, \*\.amc, \*\.asf"):
+    with pytest.raises(
+        UploadRefusedError, match=r"recordings are \*\.bvh, \*\.amc, \*\.npz, \*\.c3d, \*\.glb, \*\.asf"
+    ):
         safe_name(given, LIMITS.file_kinds)
 
 
@@ -124,7 +134,7 @@ def test_uploads_need_a_session_and_say_what_is_wrong(narrow, guest):
     assert post(narrow, "nobody", "a.bvh", b"x")[0] == 404
     assert post(narrow, session, "a.exe", b"x") == (
         415,
-        {"error": "recordings are *.bvh, *.amc, *.asf, not 'a.exe'"},
+        {"error": "recordings are *.bvh, *.amc, *.npz, *.c3d, *.glb, *.asf, not 'a.exe'"},
     )
     status, told = post(narrow, session, "a.bvh", b"x", content_type="text/plain")
     assert (status, "application/octet-stream" in told["error"]) == (415, True)
@@ -172,6 +182,36 @@ def test_a_database_is_built_of_what_was_uploaded(narrow, guest, formula_takes):
     assert len(load_database(path).takes) == 4
     guest.say("use", database="given")
     assert not guest.until("welcome").database.built
+
+
+def test_every_format_that_the_command_builds_from_is_taken(learned, tmp_path):
+    """One take each way, and rubbish by the same names."""
+    pytest.importorskip("ezc3d", reason="ezc3d writes the files (pip install 'stridecast[dev]')")
+    takes = gait(ramps((1.0, 0.0), (2.4, 1.3), (1.0, 0.0)))
+    motion = replace(takes.motion, name="take", subject="somebody")
+    write_amass(tmp_path / "amass.npz", on_smpl(motion))
+    write_c3d(tmp_path / "c3d.c3d", marker_places(motion), motion.frame_rate)
+    write_motion(tmp_path / "glb.glb", motion)
+    write_motion(tmp_path / "bvh.bvh", motion)
+    with LiveServer(learned, port=0).running() as server, open_socket(server) as socket:
+        client = Client(socket)
+        session = client.until("welcome").session
+        for path in sorted(tmp_path.iterdir()):
+            assert post(server, session, path.name, path.read_bytes())[0] == 200
+        for broken in ("no.npz", "no.c3d", "no.glb"):
+            assert post(server, session, broken, b"rubbish")[0] == 200
+        client.say("build", request=1)
+        built = client.until("built", "error")
+        assert (built.type, built.takes, built.left_out) == ("built", 4, 3), built
+        client.say("use", database="built")
+        client.say("database")
+        told = client.until("database_state")
+    used = {take.name: take for take in told.takes if take.segments}
+    assert sorted(used) == ["amass", "bvh", "c3d", "glb"]
+    for take in used.values():
+        assert take.seconds == pytest.approx(motion.seconds, abs=0.1)
+        assert "walk" in take.statuses
+    assert [bool(take.left_out) for take in told.takes if take.name == "no"] == [True] * 3
 
 
 def test_what_cannot_be_built_is_told_in_the_words_of_build(narrow, guest):

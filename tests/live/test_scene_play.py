@@ -12,7 +12,8 @@ from stridecast.live.frames import decode
 from stridecast.live.layout import REPLAYED
 from stridecast.live.messages import PlaybackMessage, SceneMessage, ViewMessage
 from stridecast.live.scene_play import ScenePlay
-from stridecast.live.staging import only_the_place_differs, place_in, read_scene
+from stridecast.live.searching import TOLD, TOLD_FIRST, GivenUp, Gone, Search
+from stridecast.live.staging import place_in, read_scene, why_anew
 
 PERIOD = 1 / 30
 
@@ -106,11 +107,13 @@ def test_places_are_told_from_words():
     assert place_in("person 'a': no way: really") == ("", "person 'a': no way: really")
 
 
-def test_only_roads_obstacles_and_walls_change_while_people_walk():
+def test_moving_obstacles_and_the_seed_alone_begin_anew():
     one = people()
-    assert only_the_place_differs(one, {**one, "obstacles": [{"center": [9, 9], "radius": 1}], "sources": []})
-    assert not only_the_place_differs(one, people(3))
-    assert not only_the_place_differs(one, {**one, "seed": 2})
+    assert why_anew(one, {**one, "obstacles": [{"center": [9, 9], "radius": 1}], "movers": []}) == ""
+    assert why_anew(one, people(3)) == ""
+    assert why_anew(one, {**one, "seed": 2}) == "the seed cannot change while people walk"
+    cart = {"points": [[0, 9], [9, 9]], "radius": 0.5, "times": [0.0, 18.0]}
+    assert why_anew(one, {**one, "seed": 2, "movers": [cart]}).startswith("moving obstacles and the seed cannot")
 
 
 # playing
@@ -237,15 +240,126 @@ def test_an_obstacle_upon_somebody_is_refused_and_nothing_changes(player):
     assert player.scene(document).applied == "kept"
 
 
-def test_somebody_more_begins_anew_and_playing_goes_on(player):
+def test_somebody_more_appears_and_walks_while_the_others_go_on(player):
+    player.scene(people(2))
+    player.act("play")
+    before = player.run(60)
+    assert player.scene(people(3)).applied == "live"
+    assert player.play.playing
+    frame = player.run(1)
+    assert frame.time == pytest.approx(before.time + PERIOD)
+    assert frame.arrays["ids"].tolist() == [1, 2, 3]
+    assert np.abs(frame.arrays["places"][:2, :2] - before.arrays["places"][:, :2]).max() < 0.1
+    assert [p.name for p in player.told("people")[-1].people] == ["person 3"]
+    assert not player.told("people")[-1].begins
+    moved = player.run(60).arrays["places"][2]
+    assert moved[1] > 1.0
+    assert player.told("player")[-1].there == 3
+
+
+def test_who_is_deleted_vanishes_and_counts_as_nobody(player):
+    player.scene(people(3))
+    player.act("play")
+    player.run(30)
+    kept = [{"name": f"person {k}", **people(3)["people"][k - 1]} for k in (1, 3)]
+    assert player.scene({"people": kept}).applied == "live"
+    assert player.run(1).arrays["ids"].tolist() == [1, 3]
+    told = player.told("player")[-1]
+    assert (told.came, told.there, told.arrived) == (3, 2, 0)
+    player.act("restart")
+    assert player.run(1).arrays["ids"].tolist() == [1, 2]
+
+
+def test_whose_goal_is_moved_goes_on_and_whose_start_is_moved_comes_anew(player):
+    document = people(2)
+    player.scene(document)
+    player.act("play")
+    before = player.run(60).arrays["places"]
+    ann, bob = document["people"]
+    run = {"status": "run", "velocity": 2.8}
+    checked = player.scene({"people": [{**ann, "goals": [[-9, 9]], "behavior": run}, {**bob, "start": [9, 0]}]})
+    assert (checked.applied, checked.anew) == ("live", ["person 2"])
+    frame = player.run(1)
+    assert frame.arrays["ids"].tolist() == [1, 3]
+    assert np.abs(frame.arrays["places"][0, :2] - before[0, :2]).max() < 0.1
+    assert np.allclose(frame.arrays["places"][1, :2], (9, 0), atol=0.1)
+    again = [p for m in player.told("people") for p in m.people if p.id == 1]
+    assert [p.status for p in again] == ["walk", "run"]
+    assert player.run(60).arrays["places"][0, 0] < -1.0
+
+
+def test_moving_obstacles_begin_anew_and_it_is_said_why(player):
     player.scene(people(2))
     player.act("play")
     player.run(30)
-    assert player.scene(people(3)).applied == "restarted"
+    cart = {"name": "cart", "points": [[9, 20], [-9, 20]], "radius": 0.5, "times": [0.0, 18.0]}
+    checked = player.scene(people(2, movers=[cart]))
+    assert (checked.applied, checked.message) == ("restarted", "moving obstacles cannot change while people walk")
     assert player.play.playing
-    frame = player.run(2)
-    assert frame.time < 0.2
-    assert frame.arrays["ids"].tolist() == [1, 2, 3]
+    assert player.run(2).time < 0.2
+
+
+def test_the_one_walker_begins_anew_as_often_as_you_like(player):
+    player.scene({"start": [0, 0], "goals": [[0, 9]]})
+    for _ in range(2):
+        player.act("restart")
+        assert player.run(1).arrays["ids"].tolist() == [1]
+
+
+# searching
+
+
+def test_a_search_is_told_about_once_it_lasts_and_at_its_end():
+    now, said = [0.0], []
+    search = Search(said.append, lambda: False, lambda: now[0])
+    with search:
+        for k in range(3):
+            search.tell_ways(k, 9)
+    assert not said
+    with search:
+        for k in range(9):
+            now[0] += 0.6 * TOLD_FIRST
+            search.tell_ways(k, 9)
+    assert 0.6 * TOLD_FIRST > TOLD
+    assert [(m.done, m.total) for m in said] == [*((k, 9) for k in range(1, 9)), (1, 1)]
+
+
+def test_a_search_ends_when_it_is_given_up_or_nobody_is_there():
+    gone = [False]
+    search = Search(lambda _: None, lambda: gone[0])
+    search.give_up()  # too early: nothing is searched for
+    with search:
+        search.tell_ways(0, 1)
+        search.give_up()
+        with pytest.raises(GivenUp):
+            search.tell_ways(0, 1)
+    gone[0] = True
+    with search, pytest.raises(Gone):
+        search.tell_ways(0, 1)
+
+
+@pytest.mark.parametrize("playing", [False, True])
+def test_a_scene_whose_search_is_given_up_leaves_everything_as_it_was(player, playing):
+    document = people(2)
+    player.scene(document)
+    if playing:
+        player.act("play")
+        player.run(30)
+    crowd, time = player.play.crowd, player.play.time
+    tell = player.play.search.tell_ways
+
+    def once(done, total):
+        player.play.search.give_up()
+        tell(done, total)
+
+    player.play.search.tell_ways = once
+    checked = player.scene(people(4, obstacles=[{"center": [0, 9], "radius": 1}]), request=5)
+    assert (checked.applied, checked.request) == ("cancelled", 5)
+    player.act("restart")
+    assert player.told("scene_checked")[-1].applied == "cancelled"
+    player.play.search.tell_ways = tell
+    assert (player.play.crowd, player.play.time, player.play.document) == (crowd, time, document)
+    assert player.scene(people(4)).applied == ("live" if playing else "restarted")
 
 
 # looking

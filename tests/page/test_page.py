@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from browsers import Visitor
+from stridecast.formats.motion_files import write_motion
+from stridecast.formats.recordings import load_motion
 from stridecast.live.serve import LiveServer
 from stridecast.model.database import MotionDatabase
 
@@ -101,7 +103,7 @@ def test_nonsense_harms_nobody(visitor: Visitor, nonsense: str) -> None:
     assert len(frames) > 10
 
 
-def test_own_recordings_become_a_database(visitor: Visitor, formula_takes: Path) -> None:
+def test_own_recordings_become_a_database(visitor: Visitor, formula_takes: Path, tmp_path: Path) -> None:
     visitor.go("database")
     visitor.until(lambda: visitor.page.locator("tbody tr").count() > 20, "the segments")
     visitor.until(lambda: visitor.frames and visitor.frames[-1].kind == 3 and visitor.frames[-1].ids.size, "a clip")
@@ -110,10 +112,19 @@ def test_own_recordings_become_a_database(visitor: Visitor, formula_takes: Path)
     visitor.until(lambda: "notes.txt" in visitor.said(), "what is wrong with notes.txt")
     visitor.drop([(path.name, path.read_text(encoding="ascii")) for path in sorted(formula_takes.glob("*.bvh"))])
     visitor.until(lambda: "3 files" in visitor.page.locator(".file-list").inner_text(), "three files at the server")
+    picker = visitor.page.get_by_label("Recordings")
+    assert picker.get_attribute("accept") == ".bvh,.amc,.npz,.c3d,.glb,.asf"
+    write_motion(tmp_path / "03_01.glb", load_motion(formula_takes / "01_01.bvh"))
+    broken = [tmp_path / name for name in ("broken.npz", "broken.c3d")]
+    for path in broken:
+        path.write_bytes(bytes(range(256)))
+    picker.set_input_files([tmp_path / "03_01.glb", *broken])
+    visitor.until(lambda: "6 files" in visitor.page.locator(".file-list").inner_text(), "six files at the server")
     visitor.button("Build a database")
     visitor.until(lambda: visitor.last("progress"), "progress")
     built = visitor.until(lambda: visitor.last("built") or visitor.last("error", code="build"), "a database")
     assert built["type"] == "built", built
+    assert (built["takes"], built["left_out"]) == (4, 2)
     visitor.button("Use it")
     visitor.until(lambda: visitor.last("welcome")["database"]["built"], "the database in use")
     visitor.until(lambda: visitor.frames[-1].kind == 3, "a clip of it")

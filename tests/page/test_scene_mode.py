@@ -70,6 +70,86 @@ def test_nobody_walks_through_what_was_drawn(visitor: Visitor) -> None:
     visitor.until(lambda: visitor.frames[-1].replayed and abs(visitor.frames[-1].time - 2) < 0.1, "two seconds again")
 
 
+def test_who_is_drawn_while_others_walk_joins_them_and_who_is_deleted_goes(visitor: Visitor) -> None:
+    begin(visitor)
+    visitor.press("a")
+    visitor.drag((-4.0, 0.0), (4.0, 0.0))
+    visitor.drag((4.0, 0.5), (-4.0, 0.5))
+    visitor.until(lambda: visitor.frames and visitor.frames[-1].ids.size == 2, "two people")
+    with visitor.recording() as frames:
+        visitor.button("Play")
+        visitor.until(lambda: visitor.frames[-1].time > 1.0, "a second")
+        visitor.drag((-2.0, -1.5), (4.0, -1.5))
+        visitor.until(lambda: visitor.frames[-1].ids.size == 3, "a third one among them")
+        visitor.until(lambda: visitor.frames[-1].speeds[-1] > 0.5, "who walks")
+        visitor.press("Delete")
+        visitor.until(lambda: visitor.frames[-1].ids.size == 2, "two again")
+        visitor.button("Pause")
+    assert (np.diff([frame.time for frame in frames]) > -1e-9).all(), "time went back"
+    assert {said["applied"] for said in visitor.messages if said["type"] == "scene_checked"} <= {
+        *("empty", "restarted", "live", "kept")
+    }
+    for k in (1, 2):  # nobody was put elsewhere
+        places = np.array([frame.places[frame.ids.tolist().index(k), :2] for frame in frames])
+        assert np.abs(np.diff(places, axis=0)).max() < 0.5
+
+
+def test_a_search_for_ways_is_shown_and_given_up(visitor: Visitor, tmp_path: Path) -> None:
+    """A thicket: ways through it take long."""
+    begin(visitor)
+    visitor.press("a")
+    visitor.drag((-1.0, 0.0), (1.0, 0.0))
+    visitor.until(lambda: visitor.frames and visitor.frames[-1].ids.size == 1, "somebody")
+    rng = np.random.default_rng(0)
+    trees = rng.uniform((0, 0, 0.3), (28, 28, 1.2), (320, 3)).round(2).tolist()
+    lines = ["version: 1", "obstacles:", *(f"- {{center: [{x}, {z}], radius: {r}}}" for x, z, r in trees), "people:"]
+    lines += [f"- {{start: [{-2 - k}, {2 * k}], goals: [[30, {28 - 2 * k}]]}}" for k in range(14)]
+    file = tmp_path / "thicket.yaml"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    visitor.page.get_by_label("Scene file").set_input_files(file)
+    finding = visitor.page.locator(".finding")
+    visitor.until(lambda: finding.is_visible() and "Finding ways" in finding.inner_text(), "the search shown")
+    finding.get_by_role("button", name="Cancel").click()
+    visitor.until(lambda: visitor.last("scene_checked", applied="cancelled"), "the end of the search")
+    visitor.until(lambda: "Given up" in visitor.said() and not finding.is_visible(), "what became of it")
+    visitor.press("Escape", "Control+z")
+    visitor.until(lambda: visitor.messages[-1:] and visitor.last("scene_checked")["applied"] == "kept", "as it was")
+    assert visitor.frames[-1].ids.tolist() == [1]
+
+
+def test_both_panels_are_reached_on_a_narrow_screen_by_the_keyboard_too(visitor: Visitor) -> None:
+    page = visitor.page
+    page.set_viewport_size({"width": 390, "height": 844})
+    visitor.go("scene")
+    left, right = page.locator(".panel.left"), page.locator(".panel.right")
+    assert left.is_visible()
+    assert not right.is_visible()
+    page.get_by_role("button", name="Controls", exact=True).focus()
+    visitor.press("Tab")
+    assert page.evaluate("document.activeElement.textContent") == "What is going on"
+    visitor.press("Enter")
+    assert right.is_visible()
+    assert not left.is_visible()
+    for mode in ("Walk", "Database", "Scene"):
+        visitor.button(mode)
+        boxes = page.evaluate(
+            """[...document.querySelectorAll("button, input, .panel, .foot > *, canvas.stage")]
+                .filter((node) => node.checkVisibility() && !node.closest(".visually-hidden"))
+                .map((node) => [node.className, node.getBoundingClientRect()])
+                .map(([name, box]) => [name, box.left, box.right])"""
+        )
+        assert len(boxes) > 8
+        assert not [box for box in boxes if box[1] < -0.5 or box[2] > 390.5], mode
+    # what is chosen is changed there
+    page.get_by_role("button", name="Controls", exact=True).click()
+    page.locator(".thing").last.click()
+    page.get_by_role("button", name="What is going on", exact=True).click()
+    assert page.get_by_label("Name", exact=True).is_visible()
+    page.get_by_role("button", name="What is going on", exact=True).click()
+    assert not right.is_visible()
+    assert not left.is_visible()
+
+
 def test_somebody_says_why(visitor: Visitor) -> None:
     visitor.go("scene")  # the scene to begin with
     visitor.press("t")

@@ -216,6 +216,25 @@ def test_ten_thousand_obstacles_take_seconds(side, trees):
     assert (shapely.distance(line, centers) - [tree.radius for tree in trees]).min() >= 0.3 - 1e-5
 
 
+def test_a_search_is_told_about_often_and_ends_when_that_raises(trees):
+    """Whoever does not want to wait need not, wherever the search is."""
+    place = scene((0, 0), [(60, 60)], [tree for tree in trees if max(tree.center) < 60])
+    told: list[float] = []
+    generate_path(place, progress=told.append)
+    assert sum(0.6 < part < 0.9 for part in told) > 10
+    for enough in (1, len(told) // 2, len(told) - 1):
+        calls = []
+
+        def progress(part, calls=calls, enough=enough):
+            calls.append(part)
+            if len(calls) == enough:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            generate_path(place, progress=progress)
+        assert calls == told[:enough]
+
+
 PEN = (
     block("west", -3, 3, -2.8, 9),
     block("east", 2.8, 3, 3, 9),

@@ -260,9 +260,14 @@ export interface BuildMessage {
   request?: number;
 }
 
-/** Give up the build that is running; answered by an ``error`` with code ``cancelled``. */
+/**
+ * Give up the build that is running; answered by an ``error`` with code ``cancelled``.
+ *
+ * Or the search for ways that is going on, if there is one: answered by ``scene_checked`` with ``cancelled``.
+ */
 export interface CancelMessage {
   type: "cancel";
+  what?: "build" | "ways";
 }
 
 /** Database mode: play the clip that an example belongs to, as it is blended, beside the recorded segment. */
@@ -711,14 +716,17 @@ export interface Progress {
  * Answer to ``scene``. ``applied``: ``live`` (people go on), ``restarted``, ``kept`` (nothing that plays changed).
  *
  * ``refused``: ``message`` says what is wrong and ``place`` where, such as ``people[2].behavior.velocity``; what plays
- * is as it was. ``empty``: right so far, but nobody is there to play it.
+ * is as it was, as after ``cancelled``. ``empty``: right so far, but nobody is there to play it. Where something that
+ * played was ``restarted``, ``message`` says why. ``anew`` names those who have left their places and come once more,
+ * at their start, while the others go on.
  */
 export interface SceneChecked {
   type: "scene_checked";
   request: number;
-  applied: "live" | "restarted" | "kept" | "empty" | "refused";
+  applied: "live" | "restarted" | "kept" | "empty" | "refused" | "cancelled";
   message: string;
   place: string;
+  anew: string[];
 }
 
 /** Answer to ``open_scene``; everything has a name. It is not played until it comes back as ``scene``. */

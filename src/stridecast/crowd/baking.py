@@ -146,11 +146,12 @@ class Baking:
         self._radii = np.array([mover.radius for mover in crowd.scene.movers])
 
     def __iter__(self) -> Iterator[Baked]:
-        crowd, gone = self.crowd, 0
+        crowd, gone, removed = self.crowd, 0, 0
         for k in range(self.frames):
             frame = crowd.step()
             finished = [self._finish(number, True) for number, _ in crowd.left[gone:]]
-            gone = len(crowd.left)
+            finished += [self._finish(n, False) for n, _ in crowd.removed[removed:] if n in self._films]
+            gone, removed = len(crowd.left), len(crowd.removed)
             self._count(frame)
             for row, number in enumerate(frame.ids.tolist()):
                 self._film_of(number, frame.time).add(frame, row)

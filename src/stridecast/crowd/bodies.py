@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from stridecast.body.character import resized, stature
+from stridecast.model.behavior import SIZES
 from stridecast.model.database import MotionDatabase
 from stridecast.model.pose import VehicleState
 from stridecast.model.segment import MOTIONS, RUN, STAND, WALK
@@ -66,6 +67,8 @@ class Bodies:
         self._waited = np.zeros(0, np.int64)
         self._new = np.zeros(0, np.bool_)
         self._offsets = np.zeros((0, 2))
+        self._styles, self._sizes = np.zeros(0), np.zeros(0, np.int64)
+        self._altered: set[int] = set()  # pools in which somebody has become another
 
     def place(
         self,
@@ -83,6 +86,7 @@ class Bodies:
             self._grow()
         self.scales[rows] = heights / self.height
         self._waited[rows], self._new[rows] = 0, True
+        self._styles[rows], self._sizes[rows] = styles, [SIZES.index(size) for size in sizes]
         for pool, inside in self._split(rows):
             own = rows[inside] - pool * POOL
             scaled = positions[inside] / self.scales[rows[inside], None]
@@ -90,6 +94,11 @@ class Bodies:
             self._pools[pool].place(
                 own, scaled, headings[inside], phase=phases[inside], size=chosen, style=styles[inside]
             )
+
+    def alter(self, row: int, *, size: str, style: float) -> None:
+        """Let somebody who is there move otherwise from their next step on."""
+        self._styles[row], self._sizes[row] = style, SIZES.index(size)
+        self._altered.add(row // POOL)
 
     def step(
         self,
@@ -119,7 +128,11 @@ class Bodies:
                 out[own] = values[inside]
                 return out
 
+            there = slice(pool * POOL, pool * POOL + count)
+            altered = pool in self._altered
             pose = self._pools[pool].step(
+                size=[SIZES[k] for k in self._sizes[there].tolist()] if altered else None,
+                style=self._styles[there] if altered else None,
                 vehicles=VehicleState(
                     position=spread(vehicles.position) / scale[:, None],
                     velocity=spread(vehicles.velocity) / scale[:, None],
@@ -152,12 +165,13 @@ class Bodies:
             Walkers(self.database, np.zeros((POOL, 2)), frame_rate=self.frame_rate, threads=self.threads)
         )
         more = POOL * len(self._pools)
-        for name in ("roots", "rotations", "planted", "scales", "_waited", "_new", "_offsets"):
+        for name in ("roots", "rotations", "planted", "scales", "_waited", "_new", "_offsets", "_styles", "_sizes"):
             old = getattr(self, name)
             new = np.zeros((more, *old.shape[1:]), old.dtype)
             new[: len(old)] = old
             setattr(self, name, new)
         self.scales[more - POOL :] = 1.0
+        self._sizes[more - POOL :] = SIZES.index("neutral")
 
 
 def person_height(database: MotionDatabase) -> float:

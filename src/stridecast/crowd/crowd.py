@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, takewhile
 
 import numpy as np
 from jaxtyping import Bool, Int
 
 from stridecast.body.character import stature
+from stridecast.crowd.arrivals import Arrivals
 from stridecast.crowd.bodies import LEVELS, Bodies, body_of, motions_of
 from stridecast.crowd.bounds import HumanBounds
+from stridecast.crowd.changing import Changes, alike, difference, has_to_begin_anew, of_crowd
 from stridecast.crowd.explanation import Explanation, Outlook, explanation_of
 from stridecast.crowd.frame import CrowdFrame
 from stridecast.crowd.ground import ground_of
-from stridecast.crowd.newcomers import chance_of, newcomer_of, obstacle_of, slots_of, walker_of
+from stridecast.crowd.newcomers import chance_of, newcomer_of, obstacle_of, slots_of
 from stridecast.crowd.population import Due, Population
 from stridecast.crowd.routes import Routes
 from stridecast.crowd.state import make_limits
@@ -62,7 +65,8 @@ class Crowd:
         Beyond the first of these distances from the ``focus`` of a step bodies are stepped in every second frame,
         beyond the second in every third, metres. The ways of the people do not depend on it.
     progress
-        Called with how many of the people who are there at the beginning have found their ways, and how many there are.
+        Called with how many of the people who are there at the beginning have found their ways, and how many there are;
+        now and then while one is searched for, too. What it raises ends it.
 
     Raises
     ------
@@ -94,16 +98,16 @@ class Crowd:
             raise InputError(f"lod needs two distances from 0, the smaller first, not {lod}")
         if agents:
             scene = replace(scene, people=(*scene.people, *agents))
-        if scene.has_walker:
-            scene = replace(scene, people=(*scene.people, walker_of(scene)))
+        scene = of_crowd(scene)
         if not (scene.people or scene.sources):
             raise SceneError("the scene has nobody in it: a crowd needs people or sources of people")
         self.database, self.scene, self.frame_rate, self.lod = database, scene, rate, lod
         self.seed = scene.seed if seed is None else seed
         self.bounds = HumanBounds.of(database)
         self._population = Population(scene, seed=self.seed, frame_rate=rate)
-        self._coming = iter(self._population)
-        self._routes = Routes(scene, self._standing())
+        self._coming = Arrivals(self._population)
+        self._standing = self._who_stand(p for due in self._population.until(0.0) for p in due.people)
+        self._routes = Routes(scene, list(self._standing.values()))
         self._traffic = Traffic(
             make_limits(self.bounds), ground_of(scene, self._population.solids), rate, seed=self.seed, threads=threads
         )
@@ -113,19 +117,22 @@ class Crowd:
         self._count = 0
         self.came: list[Person] = []
         self.left: list[tuple[int, float]] = []
+        self.removed: list[tuple[int, float]] = []
         self.turned_away: tuple[Person, ...] = ()
-        self._held_back: list[tuple[Due, int]] = []
-        self._next: Due | None = next(self._coming, None)
         if not propose.signatures and not is_compiled(propose):
             log.warning("compiling the crowd, once for this machine and version: this takes a minute")
         self._check_sources()
         self._movers = self._traffic.add([obstacle_of(mover) for mover in scene.movers]).tolist()
         self._let_in(progress)
 
-    def _standing(self) -> list[Circle]:
-        """People who stand about from the beginning on, as what others' ways go round."""
-        stand = [p for due in self._population.until(0.0) for p in due.people if not p.stops]
-        return [Circle(name=f"{p.name} who stands", center=p.start, radius=p.behavior.body_radius) for p in stand]
+    @staticmethod
+    def _who_stand(people: Iterable[Person]) -> dict[str, Circle]:
+        """Those who stand about, by name, as what others' ways go round."""
+        return {
+            p.name: Circle(name=f"{p.name} who stands", center=p.start, radius=p.behavior.body_radius)
+            for p in people
+            if not p.stops
+        }
 
     @property
     def time(self) -> float:
@@ -137,12 +144,12 @@ class Crowd:
         """Whether everybody who is to come has come, and left; who stays for good has to stand at the last stop."""
         rows = self._rows
         there = self._settled(rows) | (self._traffic.people.points[rows] < 2)
-        return self._next is None and not self._held_back and bool(there.all())
+        return self._coming.over and bool(there.all())
 
     @property
     def waiting(self) -> int:
         """People who are due but cannot appear yet, as there is no room."""
-        return sum(len(due.people) for due, _ in self._held_back)
+        return self._coming.waiting
 
     @property
     def _rows(self) -> Int[Array, "present"]:
@@ -190,48 +197,181 @@ class Crowd:
         stay = rows[self._settled(rows)]
         return frozenset(self._ids[np.concatenate((stay, self._traffic.arrived()))].tolist())
 
-    def change(self, scene: Scene) -> None:
-        """Take over the roads, obstacles and walls of another scene while people walk; they find new ways at once.
+    def add(self, *people: Person) -> Changes:
+        """Let people come into the scene while others walk: now, or when they begin, as soon as there is room.
+
+        Raises
+        ------
+        SceneError, PathError
+            As ``change``; nothing has changed then.
+        """
+        return self.change(replace(self.scene, people=(*self.scene.people, *people)))
+
+    def remove(self, *who: int | str) -> Changes:
+        """Take people out of the scene, by number or name; who has yet to come, by name. The others go on.
+
+        Raises
+        ------
+        InputError
+            Nobody of that number or name is there or to come.
+        SceneError
+            As ``change``: the last one of a scene without sources cannot be taken out. Nothing has changed then.
+        """
+        known = {person.name for person in self.scene.people}
+        rows = {one: self._row_of(one) for one in who if one not in known}
+        names = {self._people[row].name for row in rows.values()} | {one for one in who if isinstance(one, str)}
+        people = tuple(person for person in self.scene.people if person.name not in names)
+        groups = Counter(person.together for person in people)
+        alone = [replace(p, together=None) if groups[p.together] == 1 else p for p in people]
+        changes = self.change(replace(self.scene, people=tuple(alone)))
+        others = [row for row in rows.values() if row in self._people]  # those of sources
+        if any(self._standing.pop(self._people[row].name, None) for row in others):
+            self._routes = Routes(self.scene, list(self._standing.values()))
+        return replace(changes, removed=(*changes.removed, *self._take_away(others)))
+
+    def change(self, scene: Scene, *, progress: Callable[[int, int], None] | None = None) -> Changes:
+        """Take over another scene while people walk: everybody who is in both goes on.
+
+        Where roads, obstacles or walls differ, all find new ways at once. Whose stops, behavior or company differ
+        goes on in the new way, through the stops that are left; whose start, heading, height or radius differ comes
+        anew. Who is not in the scene any more vanishes, who is new comes as soon as there is room. Sources send what
+        they say now; what they have sent stays. Who has arrived and left stays away.
 
         Parameters
         ----------
         scene
-            The new place. Its people, sources, movers and task do not matter: who is there, and comes, stays the same.
+            The new scene. Its movers and seed do not matter: these stay what they were.
+        progress
+            Called with how many new ways have been found, and how many there are; now and then while one is searched
+            for, too. What it raises ends it, and nothing has changed.
 
         Raises
         ------
         SceneError
             Something new stands where somebody is, or in the room that they need to stop; they are named. Polygons that
-            are none.
+            are none. Somebody new starts, or has to go, where the body cannot stand, or where somebody else starts.
         PathError
             Somebody would have no way on; they are named. After any of these nothing has changed.
         """
-        place = replace(self.scene, roads=scene.roads, obstacles=scene.obstacles, walls=scene.walls)
-        solids = Solids(place)
-        rows, m = self._rows, self._traffic.moving
-        for row in rows.tolist():
+        scene = replace(of_crowd(scene), movers=self.scene.movers, seed=self.seed)
+        differ = difference(self.scene, scene)
+        solids = Solids(scene) if differ.place else self._population.solids
+        here = {self._people[row].name: row for row in self._rows.tolist()}
+        coming = self._coming.names
+        have_left = {self.came[number - 1].name for number, _ in self.left} - here.keys() - coming
+        before = {person.name: person for person in self.scene.people}
+        others = {name: p for name, p in differ.other_people.items() if name not in have_left}
+        anew = [name for name, p in others.items() if name in here and has_to_begin_anew(before[name], p)]
+        altered = [name for name in others if name in here and name not in anew]
+        to_come = {*differ.new_people, *(name for name in others if name not in altered)}
+        vanish = [here[name] for name in (*(n for n in here if n in differ.gone_people), *anew)]
+        if differ.place:
+            self._check_room(solids, [row for row in self._rows.tolist() if row not in vanish])
+        sources = {
+            source.name: replace(source, begins=max(source.begins, self.time), ends=max(source.ends, self.time))
+            for source in (*differ.new_sources.values(), *differ.other_sources.values())
+        }
+        sent = {n: self._coming.sent(n) for n in sources if n in differ.other_sources or self._coming.sent(n)}
+        population = self._population.changed(scene, solids, {*differ.new_people, *others}, sources, sent)
+
+        fresh = [population.person(name) for name in (*differ.new_people, *others)]
+        gone = differ.gone_people | {person.name for person in fresh}
+        standing = {name: circle for name, circle in self._standing.items() if name not in gone}
+        standing |= self._who_stand(
+            replace(p, start=self._traffic.moving.position[here[p.name]]) if p.name in altered else p for p in fresh
+        )
+        again = differ.place or standing.keys() != self._standing.keys() or bool(standing.keys() & others.keys())
+        routes = Routes(scene, list(standing.values())) if again else self._routes.copy()
+        people = {row: self._people[row] for row in self._rows.tolist() if row not in vanish}
+        people |= {here[name]: population.person(name) for name in altered}
+        ways = self._new_ways(routes, people, differ.place, [p for p in fresh if p.name in to_come], progress)
+        streams = {name: population.stream(name) for name in sources}
+        self._check_streams(routes, population, sources.keys())
+
+        self.scene, self._routes, self._population, self._standing = scene, routes, population, standing
+        if differ.place:
+            population.stand_among(solids)
+            self._traffic.ground = ground_of(scene, solids)
+        removed = self._take_away(vanish)
+        for row in (here[name] for name in altered):
+            self._alter(row, people[row])
+        for row, way in ways.items():
+            self._traffic.send(row, way)
+        self._coming.take_out({*differ.gone_people, *to_come}, {*differ.gone_sources, *sources})
+        self._coming.put_in(population.named(to_come, self.time), streams)
+        return Changes(
+            added=tuple(differ.new_people),
+            anew=tuple(anew),
+            altered=tuple(int(self._ids[here[name]]) for name in altered),
+            removed=removed,
+        )
+
+    def _check_room(self, solids: Solids, rows: list[int]) -> None:
+        """Whether nothing that stands is where people are, or will be until they could stop."""
+        m = self._traffic.moving
+        for row in rows:
             path = np.concatenate((m.position[row : row + 1], m.path[row, : m.stops[row]]))
             if not solids.are_clear(path, np.full(len(path), self._traffic.people.radius[row])).all():
                 raise SceneError(
                     f"something new would stand in the way of {self._people[row].name!r}, who is at "
                     f"({m.position[row, 0]:.2f}, {m.position[row, 1]:.2f}) and cannot stop before it"
                 )
-        routes = Routes(place, self._standing())
-        ways = {row: self._way_on(routes, row) for row in rows.tolist() if self._traffic.people.points[row] >= 2}
-        self.scene, self._routes, self._population.solids = place, routes, solids
-        self._traffic.ground = ground_of(place, solids)
-        for row, way in ways.items():
-            self._traffic.send(row, way)
 
-    def _way_on(self, routes: Routes, row: int) -> Array:
+    def _new_ways(
+        self,
+        routes: Routes,
+        people: dict[int, Person],
+        everybody: bool,
+        to_come: list[Person],
+        progress: Callable[[int, int], None] | None,
+    ) -> dict[int, Array]:
+        """Ways on, by row, of those whose place or stops are others; and whether those to come have ways."""
+        rows = [r for r, p in people.items() if (everybody and p.stops) or not alike(p.stops, self._people[r].stops)]
+        total = len(rows) + len(to_come)
+        ways: dict[int, Array] = {}
+        with routes.telling(progress, total) as found:
+            for row in rows:
+                ways[row] = self._way_on(routes, row, people[row])
+                found()
+            for person in to_come:
+                routes.check(person)
+                found()
+        return ways
+
+    def _way_on(self, routes: Routes, row: int, person: Person) -> Array:
         """The way from where somebody is through the stops that are left."""
-        person, here = self._people[row], self._traffic.moving.position[row]
-        stops = np.concatenate(person.stops)
-        left = self._traffic.passed(row, stops)
-        try:
-            return routes.again(person, here, stops[min(left, len(stops) - 1) :])
-        except (SceneError, PathError) as error:
-            raise type(error)(f"person {person.name!r} has no way on: {error}") from None
+        here = self._traffic.moving.position[row]
+        if not person.stops:
+            return here[None].copy()
+        stops, known = np.concatenate(person.stops), self._people[row].stops
+        passed = self._traffic.passed(row, np.concatenate(known)) if known else 0
+        same = len(list(takewhile(lambda pair: np.array_equal(*pair), zip(person.stops, known, strict=False))))
+        return routes.again(person, here, stops[min(passed, same, len(stops) - 1) :])
+
+    def _alter(self, row: int, person: Person) -> None:
+        """Let somebody who is there be somebody else who goes on in their place."""
+        way = np.zeros((1, 2))
+        slot = float(self._traffic.people.slot[row])
+        self._traffic.alter(row, newcomer_of(person, way, slot, self.bounds, self.seed))
+        if self._bodies is not None:
+            self._bodies.alter(row, size=person.behavior.size, style=person.behavior.style)
+        self._people[row] = self.came[int(self._ids[row]) - 1] = person
+
+    def _take_away(self, rows: list[int]) -> tuple[int, ...]:
+        """Let people vanish; their numbers."""
+        numbers = tuple(int(self._ids[row]) for row in rows)
+        self.removed += [(number, self.time) for number in numbers]
+        for row in rows:
+            del self._people[row]
+        self._traffic.remove(np.array(rows, np.int64))
+        return numbers
+
+    @staticmethod
+    def _check_streams(routes: Routes, population: Population, names: Collection[str]) -> None:
+        """Find a way for the first who come from sources, lest it turns out in mid-shot that there is none."""
+        for name in names:
+            for due in islice(population.stream(name), 1):
+                routes.copy().of_group(due.people)
 
     def _check_sources(self) -> None:
         """Find a way for the first who comes from each source, lest it turns out in mid-shot that there is none."""
@@ -240,7 +380,7 @@ class Crowd:
             if not missing:
                 return
             if due.source in missing:
-                self._ways(due.people)
+                self._routes.of_group(due.people)
                 missing.discard(due.source)
 
     def explain(self, who: int | str) -> Explanation:
@@ -334,30 +474,24 @@ class Crowd:
 
     def _let_in(self, progress: Callable[[int, int], None] | None = None) -> None:
         """Let in who is due and has room; the others wait outside and come as soon as there is some."""
-        now = self._traffic.frame
-        due, self._held_back = self._held_back, []
-        while self._next is not None and self._next.frame <= now:
-            due.append((self._next, 0))
-            self._next = next(self._coming, None)
+        due = self._coming.due(self._traffic.frame)
         total = sum(len(d.people) for d, _ in due)
-        done = 0
         full: set[str | None] = set()
-        for item, attempt in due:
-            waits = item.source is not None and item.source in full
-            try:
-                waits = waits or not self._enter(item, attempt)
-            except (SceneError, PathError) as error:
-                if self._traffic.frame == 0:
-                    raise
-                # In mid-shot somebody who has no way stays out; everybody else goes on.
-                log.warning("somebody stays out: %s", error)
-                self.turned_away += item.people
-            if waits:
-                full.add(item.source)
-                self._held_back.append((item, attempt + 1))
-            done += len(item.people)
-            if progress is not None:
-                progress(done, total)
+        with self._routes.telling(progress, total) as found:
+            for item, attempt in due:
+                waits = item.source is not None and item.source in full
+                try:
+                    waits = waits or not self._enter(item, attempt)
+                except (SceneError, PathError) as error:
+                    if self._traffic.frame == 0:
+                        raise
+                    # In mid-shot somebody who has no way stays out; everybody else goes on.
+                    log.warning("somebody stays out: %s", error)
+                    self.turned_away += item.people
+                if waits:
+                    full.add(item.source)
+                    self._coming.hold_back(item, attempt + 1)
+                found(len(item.people))
 
     def _enter(self, due: Due, attempt: int) -> bool:
         m, p = self._traffic.moving, self._traffic.people
@@ -366,7 +500,7 @@ class Crowd:
         group = self._population.place(due, discs, attempt=attempt)
         if group is None:
             return False
-        each = zip(group, self._ways(group), slots_of(group), strict=True)
+        each = zip(group, self._routes.of_group(group), slots_of(group), strict=True)
         news = [newcomer_of(person, way, slot, self.bounds, self.seed) for person, way, slot in each]
         at = self._add_together(news)
         if at is None:
@@ -403,17 +537,6 @@ class Crowd:
                 return None
             rows += self._traffic.add([new]).tolist()
         return np.array(rows, np.int64)
-
-    def _ways(self, group: tuple[Person, ...]) -> list[Array]:
-        """Who walks together goes the way of the first of them, each with an own beginning."""
-        ways: list[Array] = []
-        for k, person in enumerate(group):
-            try:
-                way = self._routes.way_of(person) if k == 0 or not person.stops else ways[0]
-            except (SceneError, PathError) as error:
-                raise type(error)(f"person {person.name!r}: {error}") from None
-            ways.append(way)
-        return ways
 
     def _step_bodies(self, bodies: Bodies, focus: Sequence[float] | None) -> None:
         rows, m = self._rows, self._traffic.moving

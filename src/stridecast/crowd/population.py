@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
-from itertools import takewhile
+from itertools import chain, takewhile
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +15,7 @@ from scipy.spatial import cKDTree
 from stridecast.crowd.areas import Area, Discs, pack, place
 from stridecast.crowd.drawing import Drawn, chance, clear_points
 from stridecast.errors import SceneError
-from stridecast.model.people import Mover, Person
+from stridecast.model.people import Mover, Person, Source
 from stridecast.model.scene import Scene
 from stridecast.paths.solids import Solids
 
@@ -74,16 +75,36 @@ class Population:
         self.seed = scene.seed if seed is None else seed
         self.frame_rate = frame_rate
         self.solids = Solids(scene)
-        self._named = self._people()
+        self._named = self._drawn(scene, self.solids, scene.people)
         self._sources = {source.name: Drawn(source, self.solids, self.seed) for source in scene.sources}
         self._at_once = self._put_down()
+        self._sent: dict[str, int] = {}
 
     def __iter__(self) -> Iterator[Due]:
-        named = ((p.begins, (p,)) for p in sorted(self._named, key=lambda p: p.begins))
-        streams = [self._due(None, named)]
-        for name, source in self._sources.items():
-            streams.append(self._due(name, self._stream(name, source)))
-        return heapq.merge(*streams, key=lambda due: due.time)
+        streams = (self.stream(name) for name in self._sources)
+        return heapq.merge(self.named(), *streams, key=lambda due: due.time)
+
+    @property
+    def sources(self) -> list[str]:
+        """Names of the sources."""
+        return list(self._sources)
+
+    def named(self, names: Collection[str] | None = None, begins: float = 0.0) -> list[Due]:
+        """When people by name are due, all or some, in the order of time; nobody before ``begins``, seconds."""
+        people = [p for p in self._named if names is None or p.name in names]
+        people.sort(key=lambda p: p.begins)
+        return list(self._due(None, ((max(p.begins, begins), (p,)) for p in people)))
+
+    def stream(self, source: str) -> Iterator[Due]:
+        """Who comes from a source and when, in the order of time."""
+        drawn, there = self._sources[source], self._sent.get(source, 0)
+        groups = self._at_once[source]
+        now = ((drawn.source.begins, group) for group in groups)
+        return self._due(source, chain(now, drawn.arrivals(there + sum(map(len, groups)))), there)
+
+    def person(self, name: str) -> Person:
+        """Somebody of the scene by name, their stops drawn."""
+        return next(person for person in self._named if person.name == name)
 
     def until(self, seconds: float) -> list[Due]:
         """Who is due up to a time."""
@@ -114,44 +135,89 @@ class Population:
         found = place(self.solids, self._sources[due.source].area, rng, radii, discs)
         return None if found is None else _at(due.people, found)
 
-    def _due(self, source: str | None, groups: Iterator[tuple[float, tuple[Person, ...]]]) -> Iterator[Due]:
-        for number, (time, people) in enumerate(groups):
+    def changed(
+        self,
+        scene: Scene,
+        solids: Solids,
+        people: Collection[str],
+        sources: Mapping[str, Source],
+        sent: Mapping[str, int],
+    ) -> Population:
+        """Everybody who comes into a scene that becomes another one in mid-play.
+
+        Parameters
+        ----------
+        scene, solids
+            The scene from now on.
+        people
+            Names of those who are new, or not what they were; the others stay as they were drawn.
+        sources
+            Those which are new, or not what they were, beginning now at the earliest.
+        sent
+            How many have come so far from those which are not new. New ones alone put people into their areas at once;
+            who has no room there waits for it.
+
+        Raises
+        ------
+        SceneError
+            As a new population would, about these people and sources.
+        """
+        out = copy(self)
+        drawn = {p.name: p for p in self._named} | {
+            p.name: p for p in self._drawn(scene, solids, tuple(p for p in scene.people if p.name in people))
+        }
+        out.scene, out.solids = scene, solids
+        out._named = [drawn[person.name] for person in scene.people]
+        fresh = {name: Drawn(source, solids, self.seed) for name, source in sources.items()}
+        out._sources = {source.name: fresh.get(source.name) or self._sources[source.name] for source in scene.sources}
+        out._at_once = self._at_once | {name: [] if name in sent else s.at_once() for name, s in fresh.items()}
+        out._sent = {**self._sent, **sent}
+        return out
+
+    def stand_among(self, solids: Solids) -> None:
+        """From now on draw stops and places that are clear of these."""
+        self.solids = solids
+        for drawn in self._sources.values():
+            drawn.solids = solids
+
+    def _due(
+        self, source: str | None, groups: Iterator[tuple[float, tuple[Person, ...]]], first: int = 0
+    ) -> Iterator[Due]:
+        for number, (time, people) in enumerate(groups, first):
             frame = int(np.ceil(time * self.frame_rate - 1e-9))
             yield Due(time=time, frame=frame, people=people, source=source, number=number)
 
-    def _stream(self, name: str, source: Drawn) -> Iterator[tuple[float, tuple[Person, ...]]]:
-        for group in self._at_once[name]:
-            yield source.source.begins, group
-        yield from source.arrivals(sum(map(len, self._at_once[name])))
-
-    def _people(self) -> list[Person]:
-        """Those whom the scene has by name, their stops drawn."""
-        people = self.scene.people
+    def _drawn(self, scene: Scene, solids: Solids, among: Sequence[Person]) -> list[Person]:
+        """Some of those whom a scene has by name, their stops drawn, clear of everything and of all the others."""
+        radii = np.array([p.behavior.body_radius for p in among])
+        starts = np.array([p.start for p in among]).reshape(-1, 2)
+        solids.check_points(starts, radii, [f"the start of person {p.name!r}" for p in among])
+        names = {person.name for person in among}
+        people = scene.people
         starts = np.array([p.start for p in people]).reshape(-1, 2)
         radii = np.array([p.behavior.body_radius for p in people])
-        self.solids.check_points(starts, radii, [f"the start of person {p.name!r}" for p in people])
-        if len(people):
+        if len(among):
             reach = 2 * float(radii.max())
             for one, other in sorted(cKDTree(starts).query_pairs(reach)):
                 a, b = people[one], people[other]
                 gap = float(np.linalg.norm(a.start - b.start)) - radii[one] - radii[other]
-                if a.begins == b.begins and gap < 0:
+                if a.begins == b.begins and gap < 0 and names & {a.name, b.name}:
                     raise SceneError(
                         f"persons {a.name!r} and {b.name!r} start in the same place; put {-gap:.3g} m more between them"
                     )
-        for person in people:
-            for mover in self.scene.movers:
+        for person in among:
+            for mover in scene.movers:
                 if _touches(person, mover):
                     raise SceneError(f"the start of person {person.name!r} is where mover {mover.name!r} is then")
-        return [self._with_points(person) for person in people]
+        return [self._with_points(person, solids) for person in among]
 
-    def _with_points(self, person: Person) -> Person:
+    def _with_points(self, person: Person, solids: Solids) -> Person:
         if not person.stops:
             return person
         rng = chance(self.seed, person.name)
         areas = [Area(stop, f"stop {k + 1} of person {person.name!r}") for k, stop in enumerate(person.stops)]
         radius = np.array([person.behavior.body_radius])
-        return replace(person, stops=tuple(clear_points(self.solids, area, radius, rng) for area in areas))
+        return replace(person, stops=tuple(clear_points(solids, area, radius, rng) for area in areas))
 
     def _put_down(self) -> dict[str, list[tuple[Person, ...]]]:
         """Those who are in the areas of sources at once, clear of each other, of people by name and of movers."""

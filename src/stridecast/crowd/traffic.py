@@ -135,6 +135,11 @@ class Traffic:
         about = np.isin(m.other, rows)
         m.other[about], m.contact[about], m.since[about] = -1, np.inf, 0.0
 
+    def alter(self, row: int, new: Newcomer) -> None:
+        """Let somebody who is there go on with another speed, other preferences and company."""
+        for name in ("wish", "runs", "side", "keep", "waits", "company", "slot", "stays"):
+            getattr(self.people, name)[row] = getattr(new, name)
+
     def send(self, row: int, way: Float[Array, "points 2"]) -> None:
         """Send somebody another way from where they are."""
         along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=-1))))

@@ -244,9 +244,13 @@ class BuildMessage(Part):
 
 
 class CancelMessage(Part):
-    """Give up the build that is running; answered by an ``error`` with code ``cancelled``."""
+    """Give up the build that is running; answered by an ``error`` with code ``cancelled``.
+
+    Or the search for ways that is going on, if there is one: answered by ``scene_checked`` with ``cancelled``.
+    """
 
     type: Literal["cancel"]
+    what: Literal["build", "ways"] = "build"
 
 
 class ForgetFilesMessage(Part):
@@ -465,14 +469,17 @@ class SceneChecked(Part):
     """Answer to ``scene``. ``applied``: ``live`` (people go on), ``restarted``, ``kept`` (nothing that plays changed).
 
     ``refused``: ``message`` says what is wrong and ``place`` where, such as ``people[2].behavior.velocity``; what plays
-    is as it was. ``empty``: right so far, but nobody is there to play it.
+    is as it was, as after ``cancelled``. ``empty``: right so far, but nobody is there to play it. Where something that
+    played was ``restarted``, ``message`` says why. ``anew`` names those who have left their places and come once more,
+    at their start, while the others go on.
     """
 
     type: Literal["scene_checked"] = "scene_checked"
     request: int
-    applied: Literal["live", "restarted", "kept", "empty", "refused"]
+    applied: Literal["live", "restarted", "kept", "empty", "refused", "cancelled"]
     message: str = ""
     place: str = ""
+    anew: list[str] = []
 
 
 class SceneOpened(Part):

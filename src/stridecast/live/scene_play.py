@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,7 @@ from jaxtyping import Int
 from stridecast.crowd.crowd import Crowd
 from stridecast.crowd.frame import CrowdFrame
 from stridecast.crowd.rules import RULES
-from stridecast.crowd.step_kernels import propose
 from stridecast.errors import InputError
-from stridecast.geometry.kernels import is_compiled
 from stridecast.live.frames import Figures, encode, pack_rotations
 from stridecast.live.layout import REPLAYED, SCENE
 from stridecast.live.limits import MOST_LIVE
@@ -23,14 +21,14 @@ from stridecast.live.messages import (
     PeopleMessage,
     PlaybackMessage,
     PlayerState,
-    Progress,
     SceneChecked,
     SceneMessage,
     Somebody,
     ViewMessage,
 )
 from stridecast.live.pacing import Credit
-from stridecast.live.staging import only_the_place_differs, place_in, read_scene
+from stridecast.live.searching import GivenUp, Search
+from stridecast.live.staging import place_in, read_scene, why_anew
 from stridecast.live.timeline import Timeline
 from stridecast.model.database import MotionDatabase
 from stridecast.model.scene import Scene
@@ -45,10 +43,6 @@ LOD = (25.0, 60.0)
 
 MOST_STEPS = 12
 """Of a clock that runs faster, in one frame."""
-
-
-class Gone(Exception):  # noqa: N818  # nothing is wrong
-    """The client has left while something long was being done."""
 
 
 class ScenePlay:
@@ -77,7 +71,8 @@ class ScenePlay:
         threads: int = 1,
         gone: Callable[[], bool] = lambda: False,
     ) -> None:
-        self.database, self._tell, self._gone = database, tell, gone
+        self.database, self._tell = database, tell
+        self.search = Search(tell, gone)
         self.rate, self.threads, self._room = database.frame_rate, threads, room
         self.document: Mapping[str, Any] = {"version": 1}
         self.crowd: Crowd | None = None
@@ -97,30 +92,41 @@ class ScenePlay:
     def check(self, message: SceneMessage) -> SceneChecked:
         """Take over a scene; what became of it."""
         try:
-            return SceneChecked(request=message.request, applied=self._apply(message.scene))
+            with self.search:
+                return self._apply(message.scene, message.request)
+        except GivenUp:
+            return _cancelled(message.request)
         except InputError as error:
             place, what = place_in(str(error))
             return SceneChecked(request=message.request, applied="refused", message=what, place=place)
 
-    def _apply(self, document: Mapping[str, Any]) -> Any:
+    def _apply(self, document: Mapping[str, Any], request: int) -> SceneChecked:
         scene = read_scene(document)
         if scene is None:
             self.document, self.crowd = document, None
             self._clear()
-            return "empty"
-        crowd = self.crowd
-        if crowd is not None and only_the_place_differs(document, self.document):
+            return SceneChecked(request=request, applied="empty")
+        crowd, why = self.crowd, ""
+        if crowd is not None:
             if document == self.document:
-                return "kept"
+                return SceneChecked(request=request, applied="kept")
             if self.playing or len(self.timeline) > 1:
-                crowd.change(scene)
-                self.document = document
-                self._stale = True
-                return "live"
+                why = why_anew(self.document, document)
+                if not why:
+                    return SceneChecked(request=request, applied="live", anew=self._change(crowd, scene, document))
         crowd = self._made(scene)
         self.document = document
         self._begin(crowd)
-        return "restarted"
+        return SceneChecked(request=request, applied="restarted", message=why)
+
+    def _change(self, crowd: Crowd, scene: Scene, document: Mapping[str, Any]) -> list[str]:
+        """Change the scene while people walk; who begins anew."""
+        changes = crowd.change(scene, progress=self.search.tell_ways)
+        self.document, self._stale = document, True
+        if changes.altered:
+            self._tell(PeopleMessage(begins=False, people=_named(crowd, crowd.frame(), changes.altered), movers=[]))
+        self.tell_player()
+        return list(changes.anew)
 
     def _begin(self, crowd: Crowd) -> None:
         """Show a new crowd: its first frame, as bodies are only known once they have been stepped."""
@@ -130,16 +136,8 @@ class ScenePlay:
         self._keep(crowd)
 
     def _made(self, scene: Scene) -> Crowd:
-        if not propose.signatures and not is_compiled(propose):
-            self._tell(Progress(stage="compile", done=0, total=1))
-
-        def progress(done: int, total: int) -> None:
-            if self._gone():
-                raise Gone
-            if done % 50 == 0 and total >= 100:
-                self._tell(Progress(stage="ways", done=done, total=total))
-
-        return Crowd(self.database, scene, threads=self.threads, lod=LOD, progress=progress)
+        self.search.tell_compiling()
+        return Crowd(self.database, scene, threads=self.threads, lod=LOD, progress=self.search.tell_ways)
 
     def _clear(self) -> None:
         self.timeline = Timeline(self._room)
@@ -166,10 +164,17 @@ class ScenePlay:
                 self.playing = False
                 self._advance(self.crowd)
             case "restart":
-                self._begin(self._made(self.crowd.scene))
+                self._restart(self.crowd)
         self._stale = True
         self.tell_player()
         self.explain()
+
+    def _restart(self, crowd: Crowd) -> None:
+        try:
+            with self.search:
+                self._begin(self._made(crowd.scene))
+        except GivenUp:
+            self._tell(_cancelled(0))
 
     def scrub(self, time: float) -> None:
         """Pause, and show what was at a time.
@@ -261,22 +266,7 @@ class ScenePlay:
         """Say who those are who have come."""
         if self._known and len(crowd.came) == self._known:
             return
-        rows = {int(number): row for row, number in enumerate(frame.ids)}
-        people = []
-        for number in range(self._known + 1, len(crowd.came) + 1):
-            person, row = crowd.person(number), rows.get(number)
-            if row is not None:
-                people.append(
-                    Somebody(
-                        id=number,
-                        name=person.name,
-                        scale=float(frame.heights[row]),
-                        radius=float(frame.radii[row]),
-                        status="run" if person.behavior.status == "run" else "walk",
-                        velocity=person.behavior.velocity,
-                        style=person.behavior.style,
-                    )
-                )
+        people = _named(crowd, frame, range(self._known + 1, len(crowd.came) + 1))
         movers = [float(mover.radius) for mover in crowd.scene.movers]
         self._tell(PeopleMessage(begins=self._known == 0, people=people, movers=movers))
         self._known = len(crowd.came)
@@ -327,7 +317,7 @@ class ScenePlay:
             gone = len(crowd.left)
             counts = {
                 "came": len(crowd.came),
-                "there": len(crowd.came) - gone,
+                "there": len(crowd.came) - gone - len(crowd.removed),
                 "arrived": gone + len(crowd.at_last_stop()),
                 "waiting": crowd.waiting,
                 "turned_away": len(crowd.turned_away),
@@ -385,6 +375,28 @@ class ScenePlay:
         name = crowd.person(number).name if number <= len(crowd.came) else ""
         rule = RULES[int(figures.rules[rows[0]])] if len(rows) else ""
         self._tell(ExplanationMessage(person=number, name=name, gone=not len(rows), rule=rule))
+
+
+def _named(crowd: Crowd, frame: CrowdFrame, numbers: Sequence[int]) -> list[Somebody]:
+    """Who those are of some numbers who are there."""
+    rows = {int(number): row for row, number in enumerate(frame.ids)}
+    return [
+        Somebody(
+            id=number,
+            name=crowd.person(number).name,
+            scale=float(frame.heights[rows[number]]),
+            radius=float(frame.radii[rows[number]]),
+            status="run" if crowd.person(number).behavior.status == "run" else "walk",
+            velocity=crowd.person(number).behavior.velocity,
+            style=crowd.person(number).behavior.style,
+        )
+        for number in numbers
+        if number in rows
+    ]
+
+
+def _cancelled(request: int) -> SceneChecked:
+    return SceneChecked(request=request, applied="cancelled", message="the search was given up; all is as it was")
 
 
 def figures_of(frame: CrowdFrame) -> Figures:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import ipaddress
 import secrets
 import socket
@@ -144,12 +145,15 @@ class LiveServer:
         Walker(self.hall.database).step(
             (0.0, 0.0), motion=self.hall.database.motions[0]
         )  # compiled before anybody waits
+        gc.collect()
+        gc.freeze()  # to go through all that is there by now would take as long as several frames
         threading.Thread(target=kept_enlargement, args=(self.hall.database,), daemon=True).start()
         if ready is not None:
             threading.Thread(target=self._when_started, args=(ready,), daemon=True).start()
         try:
             self._server.run(sockets=[self._socket])
         finally:
+            gc.unfreeze()
             self.hall.close()
 
     def stop(self) -> None:

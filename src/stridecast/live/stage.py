@@ -15,6 +15,7 @@ from typing import Any, Literal
 from stridecast import __version__
 from stridecast.crowd.rules import RULES
 from stridecast.errors import InputError
+from stridecast.formats.recordings import RECORDINGS
 from stridecast.formats.scenes import parse_scene, scene_of, scene_text, scene_values
 from stridecast.formats.store import load_database, save_database
 from stridecast.live import messages as say
@@ -27,7 +28,8 @@ from stridecast.live.layout import CLAMPED
 from stridecast.live.outbox import Outbox
 from stridecast.live.pacing import Pacer
 from stridecast.live.receivers import LAST_PORT, Receivers
-from stridecast.live.scene_play import Gone, ScenePlay
+from stridecast.live.scene_play import ScenePlay
+from stridecast.live.searching import Gone
 from stridecast.live.staging import place_in
 from stridecast.live.telling import character_part, database_part, database_state, skeleton_part
 from stridecast.live.walking import Walking
@@ -80,6 +82,10 @@ class Stage(threading.Thread):
 
     def put(self, message: object) -> bool:
         """Hand over a message; False where too many wait."""
+        if isinstance(message, say.CancelMessage) and message.what == "ways":
+            if hasattr(self, "scene"):
+                self.scene.search.give_up()  # at once, as the stage is busy with what is to be given up
+            return True
         try:
             self._inbox.put_nowait(message)
         except queue.Full:
@@ -262,9 +268,10 @@ class Stage(threading.Thread):
         if self._building is not None:
             raise InputError("a database is being built already; wait for it, or cancel it")
         uploads = self.guest.uploads
-        recordings = [path for path in uploads.paths if path.suffix != ".asf"]
+        recordings = [path for path in uploads.paths if path.suffix in RECORDINGS]
         if not recordings:
-            raise InputError("no recording has been uploaded yet; send BVH, or AMC with their ASF, first")
+            known = ", ".join(RECORDINGS.values())
+            raise InputError(f"no recording has been uploaded yet; send some first ({known})")
         output = self.guest.folder / "built.safetensors"
         self._build_request = message.request
         self._building = Building(

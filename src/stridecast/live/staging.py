@@ -11,8 +11,8 @@ from stridecast.formats.scenes import is_empty, scene_of
 from stridecast.live.limits import FASTEST_FLOW, MOST_LIVE
 from stridecast.model.scene import Scene
 
-PLACE = ("roads", "obstacles", "walls")
-"""Parts that change while people walk; another change begins anew."""
+FIXED = {"movers": "moving obstacles", "seed": "the seed"}
+"""Parts that cannot change while people walk, and what they are: with others the scene begins anew."""
 
 _PLACE = re.compile(r"((?:[a-z_]+(?:\[\d+\])*)(?:\.[a-z_]+(?:\[\d+\])*)*): ")
 
@@ -47,10 +47,7 @@ def place_in(message: str) -> tuple[str, str]:
     return (found[1], message[found.end() :]) if found else ("", message)
 
 
-def only_the_place_differs(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether two documents have the same people, sources, movers and all else."""
-
-    def rest(values: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: value for name, value in values.items() if name not in PLACE and value not in (None, [], {})}
-
-    return rest(one) == rest(other)
+def why_anew(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """What cannot change while people walk and differs between two documents; nothing where there is nothing."""
+    differ = [words for name, words in FIXED.items() if (before.get(name) or None) != (after.get(name) or None)]
+    return f"{' and '.join(differ)} cannot change while people walk" if differ else ""

@@ -36,6 +36,9 @@ CORRIDOR = 0.15
 ENOUGH = 20
 """A search that meets so many new obstacles, and a quarter of those known, begins anew with them."""
 
+OFTEN = 64
+"""After so many steps of a search its progress is told, which also lets it be given up."""
+
 _ALONG = 1e-7
 """Sines of angles below this count as straight."""
 
@@ -201,9 +204,6 @@ def _search(
                 a = start if source == -1 else positions[source]
                 b = goal if node == -2 else positions[node]
                 seen[key] = space.blocking(a, b)
-                if tests % 256 == 0:
-                    progress(tests)
-                    weight = 1.0 if not nearest else HURRIED if side == "none" else HURRIED_BY_SIDE
             if seen[key]:
                 met.update(seen[key])
                 if len(met) > enough and len(met - corners.known) > enough:
@@ -213,6 +213,8 @@ def _search(
         cost[state] = so_far
         if state == aim:
             break
+        if len(cost) % OFTEN == 0:
+            progress(tests)
         here = start if node == -1 else positions[node]
         length = math.dist(goal, here)
         if node == -1 or by_goal[node] or _leaves((goal - here) / max(length, 1e-12), before[node], after[node], turn):

@@ -137,7 +137,7 @@ def _base(
     if own is not None and own.fits:
         speeds = database.examples.parameters[group.rows, 0]
         mean = _mean(features) - own(speeds, group.name) + own(speeds)
-        return np.repeat(mean[:, None], ROWS, axis=1)
+        return np.broadcast_to(mean[:, None], features.shape)  # repeating would keep other threads waiting
     ends = []
     for kind, row in ((group.start, MARGIN), (group.stop, ROWS - 1 - MARGIN)):
         posture = None if kind == "S" else postures[RUN if kind.startswith("F") else WALK]

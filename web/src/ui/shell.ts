@@ -9,11 +9,20 @@ import type { Messages } from "./messages";
 
 const TITLES: Record<ModeName, string> = { walk: "Walk", scene: "Scene", database: "Database" };
 
+type Side = "left" | "right";
+
 export class Shell {
   readonly element = el("div", { class: "page" });
   private readonly tabs = new Map<ModeName, HTMLButtonElement>();
-  private readonly left = el("aside", { class: "panel left", "aria-label": "Controls" });
-  private readonly right = el("aside", { class: "panel right", "aria-label": "What is going on" });
+  private readonly panels = {
+    left: el("aside", { class: "panel left", id: "panel-left", "aria-label": "Controls" }),
+    right: el("aside", { class: "panel right", id: "panel-right", "aria-label": "What is going on" }),
+  };
+  /** On narrow screens one panel, or none, lies over the lower part of the stage; these buttons choose it. */
+  private readonly drawers = {
+    left: button("Controls", () => this.pull("left"), { kind: "quiet" }),
+    right: button("What is going on", () => this.pull("right"), { kind: "quiet" }),
+  };
   private readonly foot = el("footer", { class: "foot" });
   private readonly link = el("span", { class: "link-text", role: "status" }, "Connecting");
   private readonly lamp = el("span", { class: "link-lamp" });
@@ -85,15 +94,35 @@ export class Shell {
         "To the stage",
       ),
       header,
-      el("main", { class: "main" }, this.left, stage, this.right, options, messages.element, this.curtain),
+      el(
+        "main",
+        { class: "main" },
+        el("nav", { class: "drawers", "aria-label": "Panels" }, this.drawers.left, this.drawers.right),
+        this.panels.left,
+        stage,
+        this.panels.right,
+        options,
+        messages.element,
+        this.curtain,
+      ),
       this.foot,
       this.dialog,
     );
+    for (const side of ["left", "right"] as const) this.drawers[side].setAttribute("aria-controls", `panel-${side}`);
+    this.pull("left");
     connection.onLink((link) => this.linked(link));
     setInterval(() => this.linked(connection.link), 500);
   }
 
   private readonly eye: HTMLButtonElement;
+
+  /** Pull a panel out, or push it back if it is out. */
+  private pull(side: Side): void {
+    const out = this.element.dataset.panel === side ? null : side;
+    this.element.dataset.panel = out ?? "none";
+    for (const each of ["left", "right"] as const)
+      this.drawers[each].setAttribute("aria-expanded", String(each === out));
+  }
 
   private toggleOptions(): void {
     this.options.hidden = !this.options.hidden;
@@ -102,8 +131,8 @@ export class Shell {
 
   show(mode: Mode): void {
     for (const [name, tab] of this.tabs) tab.setAttribute("aria-pressed", String(name === mode.name));
-    replace(this.left, mode.left);
-    replace(this.right, mode.right);
+    replace(this.panels.left, mode.left);
+    replace(this.panels.right, mode.right);
     replace(this.foot, mode.foot);
     replace(
       this.helpBody,

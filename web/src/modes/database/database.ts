@@ -33,7 +33,7 @@ export class DatabaseMode implements Mode {
     ["Click", "a dot or a row plays its clip beside the recording"],
     ["Space . Home", "play and pause, one frame, from the beginning"],
     ["[ ]", "slower, faster"],
-    ["Drop files", "BVH, AMC and ASF recordings to build a database of your own"],
+    ["Drop files", "recordings (BVH, AMC with ASF, NPZ, C3D, GLB) to build a database of your own"],
     ["Right drag, Q E, wheel", "camera"],
   ] as const;
 

@@ -21,25 +21,29 @@ export class Uploading {
   private readonly bar = el("progress", { class: "progress", max: 1, value: 0, "aria-label": "Progress" });
   private readonly stage = el("p", { class: "hint", role: "status" });
   private readonly buildButton = button("Build a database", () => this.build(), { kind: "primary" });
-  private readonly cancelButton = button("Cancel", () => this.page.connection.send({ type: "cancel" }), {});
+  private readonly cancelButton = button(
+    "Cancel",
+    () => this.page.connection.send({ type: "cancel", what: "build" }),
+    {},
+  );
   private readonly forgetButton = button("Forget them", () => this.page.connection.send({ type: "forget_files" }), {
     kind: "quiet",
   });
   private readonly useButton = button("Use it", () => this.use("built"), { kind: "primary" });
   private readonly backButton = button("Back to the one before", () => this.use("given"), {});
+  private readonly input: HTMLInputElement;
   private building = false;
   private built = false;
   private count = 0;
 
   constructor(private readonly page: Page) {
-    const input = el("input", {
+    const input = (this.input = el("input", {
       type: "file",
       multiple: true,
-      accept: ".bvh,.amc,.asf",
       class: "visually-hidden",
       tabindex: -1,
       "aria-label": "Recordings",
-    });
+    }));
     input.addEventListener("change", () => {
       void this.send([...(input.files ?? [])]);
       input.value = "";
@@ -47,7 +51,13 @@ export class Uploading {
     this.zone = el(
       "div",
       { class: "drop" },
-      el("p", {}, el("strong", {}, "Drop your recordings here"), el("br"), "BVH, or AMC with its ASF"),
+      el(
+        "p",
+        {},
+        el("strong", {}, "Drop your recordings here"),
+        el("br"),
+        "BVH, AMC with its ASF, AMASS (NPZ), C3D or GLB",
+      ),
       button("Choose files", () => input.click(), { icon: icons.open }),
       input,
     );
@@ -117,6 +127,7 @@ export class Uploading {
       this.built = false;
     }
     this.using = built;
+    this.input.accept = this.page.welcome?.limits.file_kinds.join() ?? "";
     this.show();
   }
 

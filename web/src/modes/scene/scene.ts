@@ -2,10 +2,9 @@
 
 import type { Frame } from "../../frames";
 import type { Shown } from "../../figures/people";
-import type { ExplanationMessage, ScenePart, Somebody, Welcome } from "../../protocol";
+import type { ScenePart, Somebody, Welcome } from "../../protocol";
 import type { View } from "../../stage/cameras";
 import { crowdColours, palette } from "../../stage/palette";
-import { Ribbon } from "../../stage/ribbon";
 import type { Spot } from "../../stage/stage";
 import { button, iconButton, section, segmented } from "../../ui/controls";
 import { el, replace, setText } from "../../ui/dom";
@@ -13,6 +12,7 @@ import { icons } from "../../ui/icons";
 import type { PictureOptions } from "../../ui/options";
 import { exportButtons, saveText } from "../exports";
 import type { Mode, Page } from "../mode";
+import { Asking } from "./asking";
 import {
   allOf,
   EMPTY,
@@ -30,8 +30,10 @@ import {
   thingAt,
 } from "./document";
 import { SceneDrawing } from "./drawing";
+import { Finding } from "./finding";
 import { History } from "./history";
 import { inspector } from "./inspector";
+import { personAt } from "./picking";
 import { crossing, square } from "./starter";
 import { Timeline } from "./timeline";
 import { Drawing, HINTS, type Tool } from "./tools";
@@ -50,7 +52,6 @@ const TOOLS: readonly { tool: Tool; label: string; key: string }[] = [
 
 const SEND_AFTER = 140;
 const LOOK_EVERY = 250;
-const BODY = 0.45;
 
 type Drag =
   | { what: "view"; x: number; y: number; id: number; turn: boolean; moved: boolean }
@@ -85,37 +86,20 @@ export class SceneMode implements Mode {
   private active = false;
   private drag: Drag | null = null;
   private cursor: Spot | null = null;
-  private asked: number | null = null;
   private readonly people = new Map<number, Somebody>();
   private readonly drawing = new SceneDrawing();
+  private readonly asking: Asking;
   private readonly hands: Drawing;
   private readonly timeline: Timeline;
   private readonly hint = el("p", { class: "hint-text", role: "status" }, HINTS.select);
   private readonly problem = el("p", { class: "problem", role: "alert" });
   private readonly list = el("ul", { class: "things" });
   private readonly inspected = el("div");
-  private readonly explained = el("div");
   private readonly count = el("span", { class: "count" });
   private readonly toolButtons = new Map<Tool, HTMLButtonElement>();
   private readonly undoButton = iconButton("Undo", icons.undo, () => this.undo(), "Ctrl Z");
   private readonly redoButton = iconButton("Redo", icons.redo, () => this.redo(), "Ctrl Y");
   private readonly view;
-  private readonly path = new Ribbon({
-    colour: palette.accent,
-    width: 0.07,
-    height: 0.03,
-    capacity: 600,
-    opacity: 0.9,
-    fades: false,
-  });
-  private readonly window = new Ribbon({
-    colour: palette.chosen,
-    width: 0.6,
-    height: 0.026,
-    capacity: 600,
-    opacity: 0.42,
-    fades: false,
-  });
   private sendTimer: ReturnType<typeof setTimeout> | undefined;
   private lookedAt = 0;
   private looked = "";
@@ -132,8 +116,9 @@ export class SceneMode implements Mode {
       draft: (draft) => this.drawing.sketch(draft?.points ?? [], draft ?? {}),
       say: (text) => this.page.messages.say(text),
     });
+    this.asking = new Asking(page.connection);
     this.timeline = new Timeline(page.connection, () => this.sendWaiting());
-    this.foot.append(this.problem, this.hint, this.timeline.element);
+    this.foot.append(new Finding(page.connection).element, this.problem, this.hint, this.timeline.element);
     this.problem.hidden = true;
     this.view = segmented<View>(
       "Camera",
@@ -169,11 +154,17 @@ export class SceneMode implements Mode {
       for (const somebody of people) this.people.set(somebody.id, somebody);
       if (begins) this.drawing.setMovers(movers);
     });
-    connection.on("scene_checked", ({ applied, message, place }) => {
-      this.problem.hidden = applied !== "refused";
+    connection.on("scene_checked", ({ applied, message, place, anew }) => {
+      this.problem.hidden = applied !== "refused" && applied !== "cancelled";
       if (applied === "refused") setText(this.problem, place ? `${place}: ${message}` : message);
+      if (applied === "cancelled")
+        setText(this.problem, "Given up: what walks is as it was. Undo, or change something to try again.");
       if (applied === "restarted" || applied === "empty") this.page.between.clear();
-      if (applied === "restarted") this.ask(null);
+      if (applied === "restarted") {
+        this.asking.ask(null);
+        if (message) messages.say(`The scene has begun anew: ${message}.`);
+      }
+      if (anew.length) messages.say(`${listed(anew)} ${anew.length > 1 ? "begin" : "begins"} anew; all others go on.`);
     });
     connection.on("scene_opened", ({ scene }) => {
       this.open(scene);
@@ -183,7 +174,6 @@ export class SceneMode implements Mode {
       saveText("scene.yaml", text, "application/yaml");
       messages.say("scene.yaml is being saved.", "good");
     });
-    connection.on("explanation", (told) => this.explain(told));
   }
 
   private atStart = true;
@@ -199,14 +189,14 @@ export class SceneMode implements Mode {
     }
     this.sendScene();
     this.looked = "";
-    if (this.asked !== null) this.ask(null);
+    if (this.asking.who !== null) this.asking.ask(null);
   }
 
   enter(): void {
     this.active = true;
     const { stage, between } = this.page;
     between.clear();
-    stage.scene.add(this.drawing.group, this.path.mesh, this.window.mesh);
+    stage.scene.add(this.drawing.group, ...this.asking.meshes);
     stage.setReach(260);
     stage.cameras.set(this.view.get());
     if (!this.placed) this.fit(true);
@@ -218,7 +208,7 @@ export class SceneMode implements Mode {
     this.active = false;
     this.hands.cancel();
     this.drag = null;
-    this.page.stage.scene.remove(this.drawing.group, this.path.mesh, this.window.mesh);
+    this.page.stage.scene.remove(this.drawing.group, ...this.asking.meshes);
   }
 
   // the document
@@ -264,7 +254,7 @@ export class SceneMode implements Mode {
   private open(scene: ScenePart): void {
     this.history.push(scene);
     this.chosen = [];
-    this.ask(null);
+    this.asking.ask(null);
     this.redraw();
     this.sendScene();
     this.fit();
@@ -331,8 +321,7 @@ export class SceneMode implements Mode {
     if (people) people.show(frame && frame.kind === 2 ? this.shown(frame) : [], stage.camera.position);
     const distance = stage.cameras.eye.distance;
     stage.shadowReach = Math.min(40, Math.max(7, distance * 0.85));
-    this.path.update();
-    this.window.update();
+    this.asking.update();
     if (now - this.lookedAt > LOOK_EVERY) {
       this.lookedAt = now;
       this.look();
@@ -346,13 +335,13 @@ export class SceneMode implements Mode {
       const x = between.places[3 * i]!;
       const z = between.places[3 * i + 1]!;
       const full = i < frame.full;
-      if (id === this.asked) this.page.stage.cameras.follow(x, 0.8, z);
+      if (id === this.asking.who) this.page.stage.cameras.follow(x, 0.8, z);
       yield {
         x,
         z,
         heading: between.places[3 * i + 2]!,
         scale: this.people.get(id)?.scale ?? 1,
-        colour: id === this.asked ? palette.chosen : crowdColours[id % crowdColours.length]!,
+        colour: id === this.asking.who ? palette.chosen : crowdColours[id % crowdColours.length]!,
         roots: full ? between.roots : null,
         rotations: full ? between.rotations : null,
         rootAt: 3 * i,
@@ -384,54 +373,10 @@ export class SceneMode implements Mode {
     const { cameras } = this.page.stage;
     this.placed = true;
     const [x0, z0, x1, z1] = box ?? [-5, -5, 5, 5];
-    cameras.lookAt((x0 + x1) / 2, (z0 + z1) / 2, Math.max(9, Math.hypot(x1 - x0, z1 - z0) * 1.02));
+    const { clientWidth, clientHeight } = this.page.stage.canvas;
+    const tall = Math.max(1, clientHeight / Math.max(1, clientWidth));
+    cameras.lookAt((x0 + x1) / 2, (z0 + z1) / 2, Math.max(9, Math.hypot(x1 - x0, z1 - z0) * 1.02 * tall));
     if (jump) cameras.jump();
-  }
-
-  // asking about somebody
-
-  private ask(id: number | null): void {
-    this.asked = id;
-    this.page.connection.send({ type: "explain", person: id });
-    if (id === null) {
-      this.path.clear();
-      this.window.clear();
-      replace(this.explained);
-    }
-  }
-
-  private explain(told: ExplanationMessage): void {
-    if (told.person !== this.asked) return;
-    this.path.set(told.gone ? [] : told.path.flat());
-    this.window.set(told.gone ? [] : told.window.flat());
-    const facts: [string, string][] = [];
-    if (told.other) facts.push(["Answers", told.other]);
-    if (told.contact_in !== null) facts.push(["Would meet in", `${told.contact_in.toFixed(1)} s`]);
-    if (told.side) facts.push(["Passes on the", told.side]);
-    facts.push(["Aims at", `${Math.hypot(...told.target).toFixed(2)} m/s`]);
-    const let_go = iconButton("Ask about nobody", icons.close, () => this.ask(null), "Esc");
-    let_go.classList.add("small");
-    const title = el("h2", {}, el("span", {}, told.name || `person ${told.person}`), let_go);
-    const told_ = told.gone
-      ? [el("p", { class: "why" }, "Has left the scene.")]
-      : [
-          el("p", { class: "rule" }, told.rule),
-          el("p", { class: "why" }, `${told.why[0]?.toUpperCase() ?? ""}${told.why.slice(1)}.`),
-          el(
-            "dl",
-            { class: "readings" },
-            ...facts.map(([name, value]) => el("div", { class: "reading" }, el("dt", {}, name), el("dd", {}, value))),
-          ),
-          el(
-            "p",
-            { class: "keyline" },
-            el("span", { class: "swatch path" }),
-            "way that is left",
-            el("span", { class: "swatch window" }),
-            "reserved to brake",
-          ),
-        ];
-    replace(this.explained, el("section", { class: "section explained" }, title, ...told_));
   }
 
   // mouse
@@ -484,9 +429,9 @@ export class SceneMode implements Mode {
       this.drag = { what: "handle", handle, ref: only, id, run };
       return;
     }
-    const walking = this.personAt(event.clientX, event.clientY);
+    const walking = personAt(stage, this.page.between, event.clientX, event.clientY);
     if (walking !== null) {
-      this.ask(walking);
+      this.asking.ask(walking);
       const name = this.people.get(walking)?.name;
       const index = listOf(this.scene, "people").findIndex((person) => person.name === name);
       const ref: Ref | null = index >= 0 ? { kind: "people", index } : null;
@@ -546,42 +491,10 @@ export class SceneMode implements Mode {
       if (found) this.choose(event.shiftKey ? toggled(this.chosen, found) : [found]);
       else if (!event.shiftKey) {
         this.choose([]);
-        this.ask(null);
+        this.asking.ask(null);
       }
     }
     this.history.seal();
-  }
-
-  /** Who is seen at a place of the window. */
-  private personAt(clientX: number, clientY: number): number | null {
-    const { stage, between } = this.page;
-    const frame = between.newest;
-    if (!frame || frame.kind !== 2) return null;
-    let best: number | null = null;
-    let least = Infinity;
-    for (let i = 0; i < frame.count; i++) {
-      const x = between.places[3 * i]!;
-      const z = between.places[3 * i + 1]!;
-      const feet = stage.seenAt(x, 0, z);
-      const head = stage.seenAt(x, 1.7, z);
-      if (!feet.front) continue;
-      const tall = Math.hypot(head.left - feet.left, head.top - feet.top);
-      const wide = Math.max(7, (tall / 1.7) * BODY);
-      const t = tall
-        ? ((clientX - feet.left) * (head.left - feet.left) + (clientY - feet.top) * (head.top - feet.top)) / tall ** 2
-        : 0;
-      const on = Math.min(1, Math.max(0, t));
-      const off =
-        Math.hypot(
-          clientX - feet.left - on * (head.left - feet.left),
-          clientY - feet.top - on * (head.top - feet.top),
-        ) / wide;
-      if (off < 1 && off < least) {
-        least = off;
-        best = frame.ids[i]!;
-      }
-    }
-    return best;
   }
 
   // keys
@@ -620,7 +533,7 @@ export class SceneMode implements Mode {
     else if (this.tool !== "select") this.take("select");
     else {
       this.choose([]);
-      this.ask(null);
+      this.asking.ask(null);
     }
     this.cursor = null;
     this.drawing.showCursor(null);
@@ -761,8 +674,13 @@ export class SceneMode implements Mode {
         ]),
       ),
     );
-    this.right.append(this.explained, this.inspected);
+    this.right.append(this.asking.element, this.inspected);
   }
+}
+
+function listed(names: readonly string[]): string {
+  const shown = names.length > 4 ? [...names.slice(0, 3), `${names.length - 3} more`] : names;
+  return shown.length > 1 ? `${shown.slice(0, -1).join(", ")} and ${shown.at(-1)}` : (shown[0] ?? "");
 }
 
 function toggled(refs: readonly Ref[], ref: Ref): Ref[] {
