@@ -90,7 +90,7 @@ def test_names_are_made_by_the_server(given, kept):
 @pytest.mark.parametrize("given", ["", "bvh", "x.exe", "x.bvh/", "x.bvh.zip", "x."])
 def test_other_kinds_of_files_are_refused(given):
     with pytest.raises(
-        UploadRefusedError, match=r"recordings are \*\.bvh, \*\.amc, \*\.npz, \*\.c3d, \*\.glb, \*\.asf"
+        UploadRefusedError, match=r"recordings are \*\.bvh, \*\.amc, \*\.npz, \*\.c3d, \*\.glb, \*\.vrma, \*\.asf"
     ):
         safe_name(given, LIMITS.file_kinds)
 
@@ -134,7 +134,7 @@ def test_uploads_need_a_session_and_say_what_is_wrong(narrow, guest):
     assert post(narrow, "nobody", "a.bvh", b"x")[0] == 404
     assert post(narrow, session, "a.exe", b"x") == (
         415,
-        {"error": "recordings are *.bvh, *.amc, *.npz, *.c3d, *.glb, *.asf, not 'a.exe'"},
+        {"error": "recordings are *.bvh, *.amc, *.npz, *.c3d, *.glb, *.vrma, *.asf, not 'a.exe'"},
     )
     status, told = post(narrow, session, "a.bvh", b"x", content_type="text/plain")
     assert (status, "application/octet-stream" in told["error"]) == (415, True)

@@ -117,7 +117,7 @@ class Driven:
         self.loop = asyncio.new_event_loop()
         self.outbox = Outbox(self.loop)
         self.stage = Stage(hall, self.outbox, hall.enter())
-        self.stage._use(hall.database, hall.name, built=False)
+        self.stage._use(hall.database, hall.name, None, built=False)
 
     def take(self) -> tuple[list, bytes | None]:
         texts, frame = self.loop.run_until_complete(self.outbox.next())

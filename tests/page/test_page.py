@@ -113,7 +113,7 @@ def test_own_recordings_become_a_database(visitor: Visitor, formula_takes: Path,
     visitor.drop([(path.name, path.read_text(encoding="ascii")) for path in sorted(formula_takes.glob("*.bvh"))])
     visitor.until(lambda: "3 files" in visitor.page.locator(".file-list").inner_text(), "three files at the server")
     picker = visitor.page.get_by_label("Recordings")
-    assert picker.get_attribute("accept") == ".bvh,.amc,.npz,.c3d,.glb,.asf"
+    assert picker.get_attribute("accept") == ".bvh,.amc,.npz,.c3d,.glb,.vrma,.asf"
     write_motion(tmp_path / "03_01.glb", load_motion(formula_takes / "01_01.bvh"))
     broken = [tmp_path / name for name in ("broken.npz", "broken.c3d")]
     for path in broken:

@@ -38,7 +38,13 @@ def read_values(path: str | Path) -> tuple[Any, dict[Place, int]]:
     FileError
         The file cannot be read, or is no YAML or none that is taken; with the line.
     """
-    return values_of(_text(path), path)
+    data = _data(path)
+    try:
+        return values_of(_text(data, path), path)
+    except FileError:
+        if name := looks_like(data):  # only now: anything may be the name of somebody in a scene
+            raise FileError(f"is no scene but {name}", path=path) from None
+        raise
 
 
 def values_of(text: str, path: str | Path) -> tuple[Any, dict[Place, int]]:
@@ -64,7 +70,7 @@ def values_of(text: str, path: str | Path) -> tuple[Any, dict[Place, int]]:
     return builder.root, lines
 
 
-def _text(path: str | Path) -> str:
+def _data(path: str | Path) -> bytes:
     try:
         size = Path(path).stat().st_size
     except OSError as error:
@@ -72,9 +78,10 @@ def _text(path: str | Path) -> str:
     if size > LARGEST:
         what = f"has {size / 2**20:.0f} MB; a scene has at most {LARGEST // 2**20} MB"
         raise FileError(what, path=path)
-    data = read_text(path)
-    if name := looks_like(data):
-        raise FileError(f"is no scene but {name}", path=path)
+    return read_text(path)
+
+
+def _text(data: bytes, path: str | Path) -> str:
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from stridecast.formats.recordings import RECORDINGS, SKELETONS
+from stridecast.formats.recordings import RECORDINGS
 from stridecast.live.messages import LARGEST_MESSAGE, LimitsPart
 
 MESSAGES = 240
@@ -32,6 +32,6 @@ def usual_limits() -> LimitsPart:
         file_bytes=64 * 2**20,
         files=200,
         files_bytes=512 * 2**20,
-        file_kinds=list(RECORDINGS | SKELETONS),
+        file_kinds=[*RECORDINGS, ".asf"],
         timeline_bytes=256 * 2**20,
     )
