@@ -11,7 +11,23 @@ import math
 import numpy as np
 
 from stridecast.crowd.ground_kernels import disc_way, free_way
-from stridecast.crowd.neighbour_kernels import BX, BZ, EX, EZ, FELLOW, HX, HZ, JAMMED, PX, PZ, RADIUS, ROW, VX, VZ
+from stridecast.crowd.neighbour_kernels import (
+    BX,
+    BZ,
+    EX,
+    EZ,
+    FELLOW,
+    FIRST,
+    HX,
+    HZ,
+    JAMMED,
+    PX,
+    PZ,
+    RADIUS,
+    ROW,
+    VX,
+    VZ,
+)
 from stridecast.crowd.rule_kernels import contact_time
 from stridecast.crowd.rules import GO_FIRST, GO_ON, ON_THE_WAY, RETURN
 from stridecast.crowd.state import Ground, Moving, People
@@ -62,6 +78,9 @@ HEADWAY = 0.4
 JAM = 0.08
 """Nearer than this nobody follows, metres."""
 
+BESIDE = 0.06
+"""Nobody comes nearer than this to who goes first where ways run together, metres, lest both be wedged."""
+
 JAM_LEFT_ALONE = 0.8
 """The same of people who block each other: they need the room, metres."""
 
@@ -85,6 +104,9 @@ KEEP = 0.3
 
 MANY = 6
 """So many are many."""
+
+LEAN = 4.0
+"""How much people keep to where others go the same way, rather than to their own side."""
 
 TURN = 0.15
 """Price of going to the other side than one has turned to, for those who hardly move."""
@@ -132,8 +154,8 @@ def weigh(
     x, z = moving.position[c, 0], moving.position[c, 1]
     fastest = wish * (HURRY if rule == GO_FIRST else 1.0)
     firm = 2.0 if rule == GO_ON else 1.0
-    many = 0.0 if rule == GO_ON else lane(seen, count, dx, dz)
-    drift = many * (people.side[c] if people.side[c] != 0.0 else -1.0)
+    own = people.side[c] if people.side[c] != 0.0 else -1.0
+    drift = 0.0 if rule == GO_ON else lane(seen, count, dx, dz, own)
     yields = other if rule == GO_ON else -1
     scale = 1.0 / max(wish, 0.1)
     out = moving.opposed[c]
@@ -163,7 +185,8 @@ def weigh(
             along = o[PX] * ax + o[PZ] * az
             if along <= 0.0 or o[VX] * ax + o[VZ] * az < -0.2:
                 continue  # behind, or coming towards one: that is no one to follow
-            gap = disc_way(o[PX], o[PZ], ax, az, radius + o[RADIUS], FREE)
+            beside = BESIDE if o[FIRST] > 0.0 else 0.0
+            gap = disc_way(o[PX], o[PZ], ax, az, radius + o[RADIUS] + beside, FREE)
             if gap >= FREE:
                 continue
             if o[BX] * ax + o[BZ] * az > 0.0 and along > IN_FRONT * math.hypot(o[PX], o[PZ]):
@@ -203,31 +226,48 @@ def weigh(
 
 
 @kernel
-def lane(seen: np.ndarray, count: int, dx: float, dz: float) -> float:
-    """How much people come towards one, from 0 to 1: where they do everybody keeps to their side, and lanes form."""
-    total = 0.0
+def lane(seen: np.ndarray, count: int, dx: float, dz: float, own: float) -> float:
+    """To which side people keep where many come towards them, from -1 (right) to 1 (left): so lanes form.
+
+    To where fewer come and more go the same way, else to their ``own`` side.
+    """
+    total, lean = 0.0, 0.0
     for m in range(count):
         o = seen[m]
-        along = o[PX] * dx + o[PZ] * dz
-        if along > 0.0 and o[HX] * dx + o[HZ] * dz < -0.5 and abs(o[PX] * dz - o[PZ] * dx) < ABREAST:
+        along, off = o[PX] * dx + o[PZ] * dz, o[PX] * dz - o[PZ] * dx
+        if along <= 0.0 or abs(off) >= ABREAST:
+            continue
+        facing = o[HX] * dx + o[HZ] * dz
+        if facing < -0.5:
             total += 1.0 / MANY
-    return min(max(total - 1.0 / MANY, 0.0), 1.0)  # one is not many
+            if facing < -0.8:
+                lean -= off / (ABREAST * MANY)
+        elif facing > 0.8:
+            lean += off / (ABREAST * MANY)
+    many = min(max(total - 1.0 / MANY, 0.0), 1.0)  # one is not many
+    return many * min(max(own + LEAN * lean, -1.0), 1.0)
 
 
 @kernel
 def people_in_the_way(
     seen: np.ndarray, count: int, radius: float, keep: float, ux: float, uz: float, yields: int
 ) -> float:
-    """Price of the contacts that a velocity leads to; less with fellows and with the row that ``yields``."""
+    """Price of the contacts that a velocity leads to; less with fellows and with the row that ``yields``.
+
+    Those who come after one, as ways run together, see to it themselves.
+    """
     total = 0.0
     for m in range(count):
         o = seen[m]
+        if o[FIRST] < 0.0:
+            continue
         bodies = radius + o[RADIUS]
         gap = math.hypot(o[PX], o[PZ])
         closing = ((ux - o[EX]) * o[PX] + (uz - o[EZ]) * o[PZ]) / max(gap, 1e-6)
         if closing <= 0.0:
             continue
-        price = danger(contact_time(o[PX], o[PZ], ux - o[EX], uz - o[EZ], min(bodies + keep, max(gap - 0.01, bodies))))
+        kept = min(bodies + (BESIDE if o[FIRST] > 0.0 else keep), max(gap - 0.01, bodies))
+        price = danger(contact_time(o[PX], o[PZ], ux - o[EX], uz - o[EZ], kept))
         price *= min(closing / GENTLE, 1.0) ** 2
         if o[FELLOW] > 0.0:
             price *= 0.3

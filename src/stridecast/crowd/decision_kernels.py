@@ -95,6 +95,7 @@ def decide(
     """Rule and costs of what somebody may do next; out of a jam if need be."""
     moving.jammed_next[c] = moving.jammed[c] if moving.retreat[c] > 0.0 else 0.0
     moving.opposed[c] = False
+    moving.wants_next[c, 0], moving.wants_next[c, 1] = 0.0, 0.0
     if wish < REST:
         moving.rule[c], moving.other[c], moving.contact[c], moving.chosen_side[c] = STAND, -1, np.inf, 0.0
         targets[:], costs[:] = 0.0, np.inf
@@ -173,6 +174,7 @@ def decide(
                 moving.retreat_way[c, 0], moving.retreat_way[c, 1] = bx, bz
                 dx, dz, rule, most, side = bx, bz, GIVE_WAY, np.inf, 0.0
     moving.rule[c], moving.other[c], moving.contact[c], moving.chosen_side[c] = rule, other, contact, side
+    moving.wants_next[c, 0], moving.wants_next[c, 1] = dx, dz
     if rule == WAIT:
         targets[:], costs[:] = 0.0, np.inf
         costs[0] = 0.0

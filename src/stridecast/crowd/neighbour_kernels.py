@@ -15,10 +15,13 @@ SETTLING = 0.25
 AT_REST = 0.5
 """Of two people the one is nearer who would be here sooner if everybody came at this speed besides their own, m/s."""
 
-PX, PZ, EX, EZ, VX, VZ, RADIUS, FELLOW, RANK, ROW, HX, HZ, BX, BZ, JAMMED, FIELDS = range(16)
+CLOSE, SAME_WAY = 1.0, 0.5
+"""Who are nearer than this (metres) and bound the same way (cosine) go one after the other."""
+
+PX, PZ, EX, EZ, VX, VZ, RADIUS, FELLOW, RANK, ROW, HX, HZ, BX, BZ, JAMMED, FIRST, FIELDS = range(17)
 """Columns of what is seen: place from oneself, velocity expected and present one, radius, whether they walk together
 with oneself, rank, row, where they face, where they are bound for, whether they are
-jammed."""
+jammed, whether they go first (1) or oneself (-1) where both go one after the other."""
 
 
 @kernel
@@ -100,8 +103,29 @@ def look(people: People, moving: Moving, cells: Cells, c: int, reach: float, scr
         out[ROW] = j
         out[BX], out[BZ] = moving.bound[j, 0], moving.bound[j, 1]
         out[JAMMED] = moving.jammed[j]
+        gap = math.hypot(out[PX], out[PZ]) - people.radius[c] - people.radius[j]
+        out[FIRST] = order(moving, c, j, out[PX], out[PZ], gap) if out[FELLOW] == 0.0 else 0.0
         out[HX], out[HZ] = math.sin(moving.heading[j]), math.cos(moving.heading[j])
     return n
+
+
+@kernel
+def order(moving: Moving, c: int, j: int, px: float, pz: float, gap: float) -> float:
+    """Where two close to each other are bound the same way: 1 the other, at ``(px, pz)``, goes first, -1 oneself.
+
+    Who has the other less in front of them does, wherever each wants to go now, as where ways run together at a door.
+    0 for all others, and where one of them stands to stay.
+    """
+    same = moving.bound[c, 0] * moving.bound[j, 0] + moving.bound[c, 1] * moving.bound[j, 1]
+    if gap > CLOSE or same < SAME_WAY:
+        return 0.0
+    if (moving.wants[c, 0] == 0.0 and moving.wants[c, 1] == 0.0) or (
+        moving.wants[j, 0] == 0.0 and moving.wants[j, 1] == 0.0
+    ):
+        return 0.0
+    wx, wz = moving.wants[c, 0] + moving.wants[j, 0], moving.wants[c, 1] + moving.wants[j, 1]
+    ahead = px * wx + pz * wz
+    return 1.0 if ahead > 0.0 else -1.0 if ahead < 0.0 else 0.0
 
 
 @kernel

@@ -7,7 +7,22 @@ import math
 import numpy as np
 
 from stridecast.crowd.ground_kernels import free_way
-from stridecast.crowd.neighbour_kernels import BX, BZ, EX, EZ, FELLOW, PX, PZ, RADIUS, RANK, ROW, SETTLING, VX, VZ
+from stridecast.crowd.neighbour_kernels import (
+    BX,
+    BZ,
+    EX,
+    EZ,
+    FELLOW,
+    FIRST,
+    PX,
+    PZ,
+    RADIUS,
+    RANK,
+    ROW,
+    SETTLING,
+    VX,
+    VZ,
+)
 from stridecast.crowd.rules import (
     BEHIND,
     FOLLOW,
@@ -136,6 +151,8 @@ def answer(
     side = people.side[c]
     if side == 0.0:  # the nearer one, else the right
         side = -1.0 if off > -OFFSET * (radius + o[RADIUS]) else 1.0
+    if o[FIRST] != 0.0:  # ways run together
+        return (FOLLOW if o[FIRST] > 0.0 else GO_FIRST), j, soonest, 0.0, math.inf
     if not moves and o[BX] * dx + o[BZ] * dz > QUEUES:
         return FOLLOW, j, soonest, 0.0, math.inf
     if not moves:

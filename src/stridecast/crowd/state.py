@@ -60,6 +60,8 @@ class Moving(NamedTuple):
     heading: Array  # N
     turning: Array  # N, side of a reversal under way
     place: Array  # N, how far along the way, metres
+    wants: Array  # N 2, direction in which they want to go now; none for who stands
+    wants_next: Array  # N 2, the same after this frame
     bound: Array  # N 2, direction in which the way leads on the whole; none for who stands
     # decision
     target: Array  # N 2, velocity that is aimed at
@@ -152,6 +154,8 @@ def make_moving(count: int, frames: int) -> Moving:
         heading=zeros(),
         turning=zeros(),
         place=zeros(),
+        wants=zeros(2),
+        wants_next=zeros(2),
         bound=zeros(2),
         target=zeros(2),
         rule=np.zeros(count, np.int64),

@@ -333,5 +333,6 @@ def write(
             if moving.rule[c] != STAND:
                 moving.rule[c] = HELD
         moving.jammed[c] = moving.jammed_next[c]
+        moving.wants[c, 0], moving.wants[c, 1] = moving.wants_next[c, 0], moving.wants_next[c, 1]
         find_place(people, moving, ways, c)
         look_ahead(people, moving, ways, c)
